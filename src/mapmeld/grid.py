@@ -1,0 +1,183 @@
+"""The occupancy grid, and the one place where cells meet metres.
+
+Conventions, used everywhere in mapmeld:
+
+- ``cells[row, col]`` with row 0 at the *bottom* (y up), as in ``nav_msgs/OccupancyGrid``.
+- A cell is an area. Cell (row, col) covers [col, col + 1) x [row, row + 1) in *lattice
+  units*; its centre is at (col + 0.5, row + 0.5).
+- ``origin`` is the pose of the lattice's lower left *corner* in the map's metric frame, so
+  ``metres = origin.apply(resolution * lattice)``. The yaw of the origin turns the lattice.
+- Images have row 0 at the top; `OccupancyGrid.to_image` and `from_image` are the only flips.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mapmeld.se2 import Pose2
+
+UNKNOWN = -1
+FREE = 0
+OCCUPIED = 100
+
+# What counts as a wall or as floor where cells carry probabilities [percent]:
+# the default thresholds of nav2's map_server.
+OCCUPIED_FROM = 65
+FREE_UP_TO = 25
+
+Cells = NDArray[np.int8]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OccupancyGrid:
+    """A map: cells on a square lattice with its place in a metric frame.
+
+    Attributes
+    ----------
+    cells
+        int8 array (rows, cols), row 0 at the bottom; -1 unknown, 0..100 occupancy [percent].
+        Made read-only: a grid never changes, so what is computed from it stays true.
+    resolution
+        Side of a cell [m].
+    origin
+        Pose of the lattice's lower left corner in the map's frame [m, m, rad].
+    stamp
+        Time of the map [s since the epoch or the start of a recording]; None if unknown.
+    frame_id
+        Name of the metric frame, as in a ROS header; may be empty.
+    """
+
+    cells: Cells
+    resolution: float
+    origin: Pose2 = field(default_factory=Pose2)
+    stamp: float | None = None
+    frame_id: str = ""
+
+    def __post_init__(self) -> None:
+        cells = np.asarray(self.cells)
+        if cells.ndim != 2:
+            raise ValueError(f"cells must be a (rows, cols) array, not {cells.ndim}-dimensional")
+        if not np.issubdtype(cells.dtype, np.integer):
+            raise ValueError(f"cells must be integers (-1, 0..100), not {cells.dtype}")
+        if cells.size and (cells.min() < UNKNOWN or cells.max() > OCCUPIED):
+            raise ValueError("cells must be -1 (unknown) or 0..100 (percent)")
+        if not (math.isfinite(self.resolution) and self.resolution > 0):
+            raise ValueError(f"resolution must be a positive number of metres, not {self.resolution}")
+        if not all(map(math.isfinite, (self.origin.x, self.origin.y, self.origin.theta))):
+            raise ValueError(f"origin must be finite, not {self.origin}")
+        # A read-only copy: freezing a view would leave the caller's array writable underneath.
+        if cells.dtype != np.int8 or cells.flags.writeable or not cells.flags.c_contiguous:
+            cells = np.array(cells, dtype=np.int8, order="C")
+            cells.flags.writeable = False
+        object.__setattr__(self, "cells", cells)
+
+    # ------------------------------------------------------------------ what is known
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, cols)."""
+        rows, cols = self.cells.shape
+        return rows, cols
+
+    @property
+    def occupied(self) -> Mask:
+        """Where there is an obstacle: occupancy of at least 65 percent."""
+        return self.cells >= OCCUPIED_FROM
+
+    @property
+    def free(self) -> Mask:
+        """Where there is floor: occupancy known and at most 25 percent."""
+        return (self.cells >= 0) & (self.cells <= FREE_UP_TO)
+
+    @property
+    def known(self) -> Mask:
+        """Where anything was measured."""
+        return self.cells >= 0
+
+    @property
+    def known_area(self) -> float:
+        """Measured area [m^2]."""
+        return float(np.count_nonzero(self.known)) * self.resolution**2
+
+    def __eq__(self, other: object) -> bool:
+        """Report whether cells, resolution, origin and frame are the same (stamps aside)."""
+        if not isinstance(other, OccupancyGrid):
+            return NotImplemented
+        return (
+            self.resolution == other.resolution
+            and self.origin == other.origin
+            and self.frame_id == other.frame_id
+            and np.array_equal(self.cells, other.cells)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    # ------------------------------------------------------------------ cells <-> metres
+    def lattice_to_metres(self, lattice: ArrayLike) -> NDArray[np.float64]:
+        """Take (col, row) lattice positions (..., 2) into the map's frame [m].
+
+        Whole numbers are cell corners; add 0.5 for centres.
+        """
+        return self.origin.apply(np.asarray(lattice, dtype=np.float64) * self.resolution)
+
+    def metres_to_lattice(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Take points (..., 2) of the map's frame [m] to (col, row) lattice positions.
+
+        ``floor`` of the answer is the cell that holds the point.
+        """
+        return self.origin.inverse().apply(points) / self.resolution
+
+    def centres(self, mask: Mask) -> NDArray[np.float64]:
+        """Return the centres [m], shape (n, 2), of the cells where `mask` (rows, cols) holds."""
+        rows, cols = np.nonzero(mask)
+        return self.lattice_to_metres(np.stack([cols, rows], axis=-1) + 0.5)
+
+    # ------------------------------------------------------------------ other lattices
+    def moved(self, T_new_old: Pose2) -> OccupancyGrid:
+        """Return the same cells in another metric frame: only the origin changes, exactly."""
+        return replace(self, origin=T_new_old @ self.origin)
+
+    def extended(self, left: int, bottom: int, right: int, top: int) -> OccupancyGrid:
+        """Return the map with unknown cells added (or, where negative, cells cut off) per side."""
+        rows, cols = self.shape
+        new_rows, new_cols = rows + bottom + top, cols + left + right
+        cells = np.full((max(new_rows, 0), max(new_cols, 0)), UNKNOWN, np.int8)
+        r0, r1 = max(0, -bottom), min(rows, rows + top)
+        c0, c1 = max(0, -left), min(cols, cols + right)
+        if r0 < r1 and c0 < c1:
+            cells[r0 + bottom : r1 + bottom, c0 + left : c1 + left] = self.cells[r0:r1, c0:c1]
+        x, y = self.lattice_to_metres((-left, -bottom))
+        return replace(self, cells=cells, origin=Pose2(float(x), float(y), self.origin.theta))
+
+    def cropped(self, margin: int = 0) -> OccupancyGrid:
+        """Return the map cut (or grown) to its known cells and `margin` cells around them.
+
+        A map with nothing known is returned as it is.
+        """
+        known = self.known
+        rows = np.flatnonzero(known.any(axis=1))
+        cols = np.flatnonzero(known.any(axis=0))
+        if not rows.size:
+            return self
+        height, width = self.shape
+        return self.extended(
+            left=margin - int(cols[0]),
+            bottom=margin - int(rows[0]),
+            right=margin - (width - 1 - int(cols[-1])),
+            top=margin - (height - 1 - int(rows[-1])),
+        )
+
+    # ------------------------------------------------------------------ pictures
+    def to_image(self) -> NDArray[np.uint8]:
+        """Return the paper's grey picture (rows, cols), row 0 at the top.
+
+        0 (black) obstacle, 254 (white) free, 205 (grey) unknown, as map_server writes.
+        """
+        image = np.full(self.shape, 205, np.uint8)
+        image[self.free] = 254
+        image[self.occupied] = 0
+        return np.ascontiguousarray(image[::-1])
