@@ -181,3 +181,99 @@ class OccupancyGrid:
         image[self.free] = 254
         image[self.occupied] = 0
         return np.ascontiguousarray(image[::-1])
+
+
+# Rows of the target that `resample` works on at a time: bounds memory at about 100 MB.
+_BLOCK_CELLS = 1 << 20
+
+
+def resample(
+    grid: OccupancyGrid, T_target_grid: Pose2, target: OccupancyGrid, *, keep: str = "walls"
+) -> Cells:
+    """Sample `grid`, laid down by `T_target_grid`, on the lattice of `target`.
+
+    Every target cell asks the grid what lies under it, so a rotation leaves no holes. Where the
+    target's cells are coarser than the grid's, each asks at k x k places, k = ceil(ratio), and
+    keeps the highest occupancy (``keep="walls"``: no thin wall is lost) or the mean of what
+    is known (``keep="mean"``).
+
+    Parameters
+    ----------
+    grid
+        The map to sample.
+    T_target_grid
+        Takes a point of the grid's metric frame into the target's.
+    target
+        Supplies shape, resolution and origin; its cells are not read.
+
+    Returns
+    -------
+    int8 array of the target's shape: -1 where the grid is unknown or does not reach.
+    """
+    if keep not in ("walls", "mean"):
+        raise ValueError(f"keep must be 'walls' or 'mean', not {keep!r}")
+    rows, cols = target.shape
+    out = np.full((rows, cols), UNKNOWN, np.int8)
+    if not (grid.cells.size and out.size):
+        return out
+    # One affine map from target lattice to grid lattice.
+    T_grid_target = grid.origin.inverse() @ T_target_grid.inverse() @ target.origin
+    scale = target.resolution / grid.resolution
+    c, s = math.cos(T_grid_target.theta) * scale, math.sin(T_grid_target.theta) * scale
+    tx, ty = T_grid_target.x / grid.resolution, T_grid_target.y / grid.resolution
+    k = max(1, math.ceil(scale - 1e-6))
+    offsets = [((i + 0.5) / k, (j + 0.5) / k) for j in range(k) for i in range(k)]
+    height, width = grid.shape
+    u = np.arange(cols, dtype=np.float64)
+    for start in range(0, rows, max(1, _BLOCK_CELLS // cols)):
+        stop = min(rows, start + max(1, _BLOCK_CELLS // cols))
+        v = np.arange(start, stop, dtype=np.float64)[:, None]
+        best = np.full((stop - start, cols), UNKNOWN, np.int8)
+        total = np.zeros(best.shape, np.int32)
+        count = np.zeros(best.shape, np.int32)
+        for du, dv in offsets:
+            col = np.floor(c * (u + du) - s * (v + dv) + tx).astype(np.int64)
+            row = np.floor(s * (u + du) + c * (v + dv) + ty).astype(np.int64)
+            inside = (col >= 0) & (col < width) & (row >= 0) & (row < height)
+            value = np.full(best.shape, UNKNOWN, np.int8)
+            value[inside] = grid.cells[row[inside], col[inside]]
+            np.maximum(best, value, out=best)
+            if keep == "mean":
+                known = value >= 0
+                total[known] += value[known]
+                count += known
+        if keep == "mean":
+            some = count > 0
+            best[some] = np.rint(total[some] / count[some]).astype(np.int8)
+        out[start:stop] = best
+    return out
+
+
+def at_resolution(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:
+    """Return the map on a lattice of another cell size [m] with the same lower left corner.
+
+    Coarser cells keep the highest occupancy that lies in them, so that thin walls stay whole.
+    """
+    if resolution == grid.resolution:
+        return grid
+    scale = grid.resolution / resolution
+    shape = tuple(max(1, math.ceil(n * scale - 1e-6)) for n in grid.shape) if grid.cells.size else (0, 0)
+    target = replace(grid, cells=np.full(shape, UNKNOWN, np.int8), resolution=resolution)
+    return replace(target, cells=resample(grid, Pose2(), target))
+
+
+def overlap_share(a: OccupancyGrid, b: OccupancyGrid, T_a_b: Pose2) -> float:
+    """Return the area known in both maps / the known area of the smaller one, 0..1.
+
+    Measured on a regular sample of at most about 60,000 of b's cells.
+    """
+    smaller = min(a.known_area, b.known_area)
+    if smaller == 0.0:
+        return 0.0
+    step = max(1, math.ceil(math.sqrt(b.cells.size / 60_000)))
+    rows, cols = np.nonzero(b.cells[::step, ::step] >= 0)
+    points = b.lattice_to_metres(np.stack([cols, rows], axis=-1) * step + 0.5)
+    col, row = np.floor(a.metres_to_lattice(T_a_b.apply(points))).astype(np.int64).T
+    inside = (col >= 0) & (col < a.shape[1]) & (row >= 0) & (row < a.shape[0])
+    both = np.count_nonzero(a.cells[row[inside], col[inside]] >= 0)
+    return min(1.0, both * (b.resolution * step) ** 2 / smaller)

@@ -82,9 +82,7 @@ class Pose2:
         return f"x {self.x:.3f} m, y {self.y:.3f} m, theta {math.degrees(self.theta):.2f} deg"
 
 
-def rigid_through(
-    a_from: ArrayLike, b_from: ArrayLike, a_to: ArrayLike, b_to: ArrayLike
-) -> Pose2:
+def rigid_through(a_from: ArrayLike, b_from: ArrayLike, a_to: ArrayLike, b_to: ArrayLike) -> Pose2:
     """Return the rigid motion that lays segment a_from->b_from onto a_to->b_to.
 
     The directions are made equal and the midpoints coincide (the least-squares answer

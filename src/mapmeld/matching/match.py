@@ -1,0 +1,83 @@
+"""One signature for every matcher."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from mapmeld.errors import MapmeldError
+from mapmeld.grid import OccupancyGrid
+from mapmeld.matching.alphabet import AlphabetParameters, match_alphabet
+from mapmeld.matching.result import MatchResult
+
+
+class UnknownMethodError(MapmeldError):
+    """There is no matcher of that name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """A matcher and the class of its settings (all of whose fields have defaults)."""
+
+    run: Callable[[OccupancyGrid, OccupancyGrid, Any], MatchResult]
+    parameters: type[Any]
+    summary: str
+
+
+METHODS: Mapping[str, Method] = {
+    "alphabet": Method(match_alphabet, AlphabetParameters, "the paper's alphabet of corner relations"),
+}
+
+
+def method_named(name: str) -> Method:
+    """Return a matcher by its name.
+
+    Raises
+    ------
+    UnknownMethodError
+        The message lists the names that exist.
+    """
+    if name not in METHODS:
+        raise UnknownMethodError(f"unknown method {name!r}: choose from {', '.join(METHODS)}")
+    return METHODS[name]
+
+
+def match(
+    a: OccupancyGrid, b: OccupancyGrid, method: str = "alphabet", parameters: object | None = None
+) -> MatchResult:
+    """Find how map b fits on map a.
+
+    Parameters
+    ----------
+    a, b
+        The maps; resolution, size, origin and yaw may all differ.
+    method
+        A key of `METHODS`.
+    parameters
+        Settings of the method, an instance of its parameter class; None for the defaults.
+
+    Returns
+    -------
+    MatchResult
+        `T_a_b` takes a point of b's metric frame into a's. Maps with nothing to match on
+        (no obstacle, nothing known) are rejected, never an error.
+
+    Raises
+    ------
+    UnknownMethodError
+        `method` is not known.
+    TypeError
+        `parameters` is of another method's class.
+    """
+    chosen = method_named(method)
+    if parameters is None:
+        parameters = chosen.parameters()
+    if not isinstance(parameters, chosen.parameters):
+        raise TypeError(
+            f"method {method!r} takes {chosen.parameters.__name__}, not {type(parameters).__name__}"
+        )
+    started = time.perf_counter()
+    result = chosen.run(a, b, parameters)
+    return replace(result, method=method, seconds=time.perf_counter() - started)
