@@ -29,6 +29,7 @@ from scipy.sparse.csgraph import dijkstra
 from mapmeld.errors import MapmeldError
 from mapmeld.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from mapmeld.io import save
+from mapmeld.io.atomic import check_targets, write_files
 from mapmeld.se2 import Pose2
 
 Floats = NDArray[np.float64]
@@ -367,16 +368,14 @@ def write_all(out: Path, seed: int, force: bool) -> None:
     """Simulate every robot and write its map and the truth into the folder `out`."""
     names = [*TOURS, "other_building"]
     files = [out / f"{name}.{ending}" for name in names for ending in ("yaml", "pgm")] + [out / "truth.yaml"]
-    there = [file for file in files if file.exists()]
-    if there and not force:
-        raise MapmeldError(f"{there[0]} exists already: give another --out, or --force to overwrite")
+    out.mkdir(parents=True, exist_ok=True)
+    check_targets(files, force=force)  # before the work, not after it
     jobs = [(name, OFFICE, tour) for name, tour in TOURS.items()] + [("other_building", OTHER, OTHER_TOUR)]
     # A stream of numbers for each robot: changing one tour leaves the other maps as they are.
     maps = {
         name: simulate(building, tour, np.random.default_rng((seed, number)))
         for number, (name, building, tour) in enumerate(jobs)
     }
-    out.mkdir(parents=True, exist_ok=True)
     for name, grid in maps.items():
         save(grid, out / f"{name}.yaml", force=force)
     text = (
@@ -384,9 +383,7 @@ def write_all(out: Path, seed: int, force: bool) -> None:
         "# Start poses are in the building's frame; each is the origin of that robot's map.\n"
         + yaml.safe_dump(truth(TOURS), default_flow_style=None, sort_keys=False)
     )
-    temporary = out / "truth.yaml.part"
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(out / "truth.yaml")
+    write_files([(out / "truth.yaml", [text.encode()])], force=force)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -101,9 +101,10 @@ def match_alphabet(
 
 
 def _nothing_to_match_on(matching: MapMatching) -> str:
-    for name, grid, alphabet in zip("ab", matching.maps, matching.alphabets, strict=True):
+    for name, grid in zip("ab", matching.maps, strict=True):
         if not grid.occupied.any():
             return f"nothing to match on: map {name} has no obstacle"
+    for name, alphabet in zip("ab", matching.alphabets, strict=True):
         if not len(alphabet.letter):
             return (
                 f"nothing to match on: the {len(alphabet.corners_px)} corners of map {name} have no relations"

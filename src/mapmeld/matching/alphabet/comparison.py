@@ -89,11 +89,13 @@ def _count_equal_rotations(
 ) -> NDArray[np.int64]:
     """Count, per pair of letters, the couples of correspondences whose rotations agree within nu."""
     # One sort for all: every pair of letters gets its own stretch of a line, wider than a turn.
+    # It starts a little inside, so that rounding moves no key into the stretch before.
     stretch = 2 * _TURN
-    key = np.sort(pair * stretch + rotation)
-    partners = np.searchsorted(key, key + nu, side="right") - np.arange(1, len(key) + 1)
+    key = pair * stretch + rotation + 1.0
     # The circle closes: what lies within nu past zero is also a turn further on.
-    across = key[key % stretch <= nu] + _TURN
+    across = np.sort(key[rotation <= nu]) + _TURN
+    key.sort()
+    partners = np.searchsorted(key, key + nu, side="right") - np.arange(1, len(key) + 1)
     partners += np.searchsorted(across, key + nu, side="right") - np.searchsorted(across, key)
     owner = (key // stretch).astype(np.intp)
     return np.bincount(owner, weights=partners, minlength=pairs).astype(np.int64)

@@ -1,0 +1,207 @@
+import math
+
+import numpy as np
+import pytest
+from drawing import drawn, office, picture_of, seen_from
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from mapmeld.grid import OccupancyGrid, at_resolution, overlap_share, resample
+from mapmeld.se2 import Pose2
+
+poses = st.from_type(Pose2)
+resolutions = st.sampled_from([0.02, 0.05, 0.1, 1.0])
+small_cells = arrays(np.int8, st.tuples(st.integers(1, 8), st.integers(1, 8)), elements=st.integers(-1, 100))
+grids = st.builds(OccupancyGrid, small_cells, resolutions, poses)
+
+L_SHAPE = """
+#..
+#..
+###
+"""
+
+
+# ------------------------------------------------------------------ what a grid is
+def test_row_0_is_the_bottom_row() -> None:
+    grid = drawn(L_SHAPE)
+    assert grid.cells[0].tolist() == [100, 100, 100]
+    assert grid.cells[2].tolist() == [100, 0, 0]
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [np.zeros(3, np.int8), np.zeros((2, 2)), np.full((2, 2), 101, np.int16), np.full((2, 2), -2, np.int8)],
+)
+def test_cells_that_are_no_occupancy_are_refused(cells: np.ndarray) -> None:
+    with pytest.raises(ValueError, match="cells"):
+        OccupancyGrid(cells, 0.05)
+
+
+@pytest.mark.parametrize("resolution", [0.0, -0.05, math.nan, math.inf])
+def test_a_resolution_must_be_a_length(resolution: float) -> None:
+    with pytest.raises(ValueError, match="resolution"):
+        OccupancyGrid(np.zeros((1, 1), np.int8), resolution)
+
+
+def test_an_origin_must_be_finite() -> None:
+    with pytest.raises(ValueError, match="origin"):
+        OccupancyGrid(np.zeros((1, 1), np.int8), 1.0, Pose2(math.nan))
+
+
+def test_a_grid_does_not_change_with_the_array_that_it_was_made_from() -> None:
+    cells = np.zeros((2, 2), np.int8)
+    grid = OccupancyGrid(cells, 1.0)
+    cells[0, 0] = 100
+    assert grid.cells[0, 0] == 0
+    with pytest.raises(ValueError, match="read-only"):
+        grid.cells[0, 0] = 100
+
+
+def test_percentages_between_the_thresholds_are_known_but_neither_wall_nor_floor() -> None:
+    grid = OccupancyGrid(np.array([[-1, 0, 25, 26, 64, 65, 100]], np.int8), 1.0)
+    assert grid.known.tolist() == [[False, True, True, True, True, True, True]]
+    assert grid.free.tolist() == [[False, True, True, False, False, False, False]]
+    assert grid.occupied.tolist() == [[False, False, False, False, False, True, True]]
+
+
+def test_equality_looks_at_cells_and_place() -> None:
+    assert drawn(L_SHAPE) == drawn(L_SHAPE)
+    assert drawn(L_SHAPE) != drawn(L_SHAPE, resolution=2.0)
+    assert drawn(L_SHAPE) != drawn(L_SHAPE, origin=Pose2(1.0))
+    assert drawn(L_SHAPE) != drawn("###\n#..\n#..")
+
+
+# ------------------------------------------------------------------ cells <-> metres
+def test_the_centre_of_the_first_cell_is_half_a_cell_from_the_origin() -> None:
+    grid = drawn(L_SHAPE, resolution=0.5, origin=Pose2(10, 20, math.pi / 2))
+    first = np.zeros(grid.shape, bool)
+    first[0, 0] = True
+    np.testing.assert_allclose(grid.centres(first), [(9.75, 20.25)])
+    first[0, 1] = True  # the next column lies up the y axis: the lattice is turned
+    np.testing.assert_allclose(grid.centres(first)[1], (9.75, 20.75))
+
+
+@given(grids, st.tuples(st.floats(-20, 20), st.floats(-20, 20)))
+def test_lattice_and_metres_are_inverse(grid: OccupancyGrid, lattice: tuple[float, float]) -> None:
+    back = grid.metres_to_lattice(grid.lattice_to_metres(lattice))
+    np.testing.assert_allclose(back, lattice, atol=1e-6)
+
+
+@given(grids, poses)
+def test_moving_a_map_moves_its_points(grid: OccupancyGrid, T: Pose2) -> None:
+    everything = np.ones(grid.shape, bool)
+    np.testing.assert_allclose(
+        grid.moved(T).centres(everything), T.apply(grid.centres(everything)), atol=1e-6
+    )
+
+
+# ------------------------------------------------------------------ crop and extend
+@given(grids, *[st.integers(0, 4)] * 4)
+def test_added_border_is_unknown_and_moves_nothing(
+    grid: OccupancyGrid, left: int, bottom: int, right: int, top: int
+) -> None:
+    bigger = grid.extended(left, bottom, right, top)
+    assert bigger.shape == (grid.shape[0] + bottom + top, grid.shape[1] + left + right)
+    assert bigger.known_area == grid.known_area
+    np.testing.assert_allclose(bigger.centres(bigger.known), grid.centres(grid.known), atol=1e-6)
+    back = bigger.extended(-left, -bottom, -right, -top)
+    np.testing.assert_array_equal(back.cells, grid.cells)
+
+
+@given(grids, st.integers(0, 3))
+def test_cropping_keeps_what_is_known_where_it_is(grid: OccupancyGrid, margin: int) -> None:
+    cropped = grid.cropped(margin)
+    np.testing.assert_allclose(cropped.centres(cropped.known), grid.centres(grid.known), atol=1e-6)
+    np.testing.assert_array_equal(cropped.cells[cropped.known], grid.cells[grid.known])
+    if margin == 0 and grid.known.any():
+        border = (cropped.known[0], cropped.known[-1], cropped.known[:, 0], cropped.known[:, -1])
+        assert all(side.any() for side in border)
+
+
+def test_cropping_an_unknown_map_returns_it() -> None:
+    grid = drawn("   \n   ")
+    assert grid.cropped() == grid
+
+
+# ------------------------------------------------------------------ resampling
+@given(grids)
+def test_a_map_sampled_on_its_own_lattice_is_itself(grid: OccupancyGrid) -> None:
+    np.testing.assert_array_equal(resample(grid, Pose2(), grid), grid.cells)
+
+
+@given(grids, poses)
+def test_a_map_moved_with_its_target_is_itself(grid: OccupancyGrid, T: Pose2) -> None:
+    np.testing.assert_array_equal(resample(grid, T, grid.moved(T)), grid.cells)
+
+
+@pytest.mark.parametrize("quarter_turns", [1, 2, 3])
+def test_quarter_turns_move_every_cell_exactly(quarter_turns: int) -> None:
+    grid = drawn("#..\n#. ")
+    turned = seen_from(grid, Pose2(0, 0, quarter_turns * math.pi / 2)).cropped()
+    np.testing.assert_array_equal(turned.cells, np.rot90(grid.cells[::-1], quarter_turns)[::-1])
+
+
+def test_what_the_map_does_not_reach_is_unknown() -> None:
+    target = drawn("...\n...\n...")
+    shifted = OccupancyGrid(resample(drawn("#"), Pose2(1, 2), target), 1.0)
+    assert picture_of(shifted) == " # \n   \n   "
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(0, 1), st.floats(0, 1))
+def test_a_turned_floor_has_no_holes_and_no_doubled_walls(theta: float, x: float, y: float) -> None:
+    room = drawn("\n".join(["#" * 40] * 3 + ["#" * 3 + "." * 34 + "#" * 3] * 34 + ["#" * 40] * 3))
+    turned = seen_from(room, Pose2(x, y, theta))
+    # Each cell answers for what lies under its centre, so areas stay as they were:
+    assert np.count_nonzero(turned.known) == pytest.approx(40 * 40, rel=0.03)
+    assert np.count_nonzero(turned.occupied) == pytest.approx(40 * 40 - 34 * 34, rel=0.06)
+    # and a cell is a wall exactly where its own centre lies in the wall.
+    where = Pose2(x, y, theta).inverse().apply(turned.centres(np.ones(turned.shape, bool)))
+    inside = ((where > 0) & (where < 40)).all(axis=-1)
+    floor = ((where > 3) & (where < 37)).all(axis=-1)
+    np.testing.assert_array_equal(turned.known.ravel(), inside)
+    np.testing.assert_array_equal(turned.free.ravel(), floor)
+
+
+def test_coarser_cells_keep_thin_walls() -> None:
+    wall = np.zeros((40, 40), np.int8)
+    wall[:, 17] = 100
+    coarse = at_resolution(OccupancyGrid(wall, 0.05), 0.2)
+    assert coarse.shape == (10, 10)
+    assert coarse.occupied[:, 4].all()
+    assert np.count_nonzero(coarse.occupied) == 10
+
+
+def test_coarser_cells_may_take_the_mean() -> None:
+    fine = OccupancyGrid(np.array([[0, 100], [-1, 50]], np.int8), 1.0)
+    target = OccupancyGrid(np.zeros((1, 1), np.int8), 2.0)
+    assert resample(fine, Pose2(), target, keep="mean").tolist() == [[50]]
+    with pytest.raises(ValueError, match="keep"):
+        resample(fine, Pose2(), target, keep="some")
+
+
+def test_finer_cells_repeat() -> None:
+    assert picture_of(at_resolution(drawn("#.", resolution=1.0), 0.5)) == "##..\n##.."
+
+
+# ------------------------------------------------------------------ overlap
+def test_overlap_is_the_share_of_the_smaller_map() -> None:
+    a, b = drawn("." * 10), drawn("." * 4)
+    assert overlap_share(a, b, Pose2()) == 1.0
+    assert overlap_share(a, b, Pose2(8, 0)) == 0.5
+    assert overlap_share(b, a, Pose2(8, 0).inverse()) == 0.5
+    assert overlap_share(a, b, Pose2(0, 5)) == 0.0
+    assert overlap_share(a, drawn("  "), Pose2()) == 0.0
+
+
+@given(poses, poses)
+def test_overlap_does_not_depend_on_the_frames(T_a: Pose2, T_b: Pose2) -> None:
+    a, b = office(0.2), office(0.25)
+    T_a_b = Pose2(3.0, 2.0, 0.5)
+    moved = overlap_share(a.moved(T_a), b.moved(T_b), T_a @ T_a_b @ T_b.inverse())
+    assert moved == pytest.approx(overlap_share(a, b, T_a_b), abs=2e-3)
+
+
+# ------------------------------------------------------------------ pictures
+def test_pictures_are_grey_as_in_the_paper_with_the_top_row_first() -> None:
+    assert drawn("#. \n...").to_image().tolist() == [[0, 254, 205], [254, 254, 254]]
