@@ -1,4 +1,6 @@
+import cv2
 import numpy as np
+import pytest
 from drawing import office
 
 from mapmeld.matching.alphabet import AlphabetParameters, extract_corners, preprocess
@@ -41,3 +43,13 @@ def test_only_strong_corners_are_taken() -> None:
 def test_a_blank_map_has_no_corners() -> None:
     assert extract_corners(np.full((9, 9), 255, np.uint8), AlphabetParameters()).shape == (0, 2)
     assert extract_corners(np.zeros((0, 0), np.uint8), AlphabetParameters()).shape == (0, 2)
+
+
+@pytest.mark.parametrize("rows", [7, 128])
+def test_they_are_opencvs_good_features_to_track(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mapmeld.matching.alphabet.corners._STRIP_ROWS", rows)
+    rng = np.random.default_rng(5)
+    image = cv2.GaussianBlur(rng.integers(0, 255, (150, 200), np.uint8), (0, 0), 2)  # no two equally strong
+    ours = extract_corners(image, AlphabetParameters(corners=50, corner_spacing_px=8.0))
+    theirs = cv2.goodFeaturesToTrack(image, 50, 0.2, 8.0).reshape(-1, 2) + 0.5
+    np.testing.assert_array_equal(ours, theirs)

@@ -21,8 +21,8 @@ from scipy.spatial import KDTree
 from mapmeld.matching.alphabet.letters import Alphabet
 
 _TURN = 2 * np.pi
-# Correspondences handled at a time: bounds memory at about 200 MB.
-_CHUNK = 1 << 21
+# Correspondences handled at a time: what fits into the cache is sorted fastest, and memory is bounded.
+_CHUNK = 1 << 17
 # Distances and angles are compared with this slack, so that values equal to the tolerance on
 # paper are equal after rounding too, whatever frame they were computed in.
 _ROUNDING = 1e-9

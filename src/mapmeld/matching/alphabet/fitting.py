@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from mapmeld.matching.alphabet.candidates import Candidate
@@ -43,8 +45,8 @@ def align(candidate: Candidate, corners_1_px: Points, corners_2_px: Points) -> P
 
 def black_pixels(image: Image) -> Points:
     """Return the centres (col, row) + 0.5 of an image's black pixels, shape (n, 2) [px]."""
-    rows, cols = np.nonzero(image == BLACK)
-    return np.stack([cols, rows], axis=-1).astype(np.float64) + 0.5
+    rows, cols = np.divmod(np.flatnonzero(image == BLACK), max(image.shape[1], 1))
+    return np.stack([cols, rows]).T + 0.5
 
 
 def jaccard_similarity(image_1: Image, black_2_px: Points, T_1_2_px: Pose2) -> float:
@@ -54,12 +56,14 @@ def jaccard_similarity(image_1: Image, black_2_px: Points, T_1_2_px: Pose2) -> f
     nearest-neighbour rotation of the whole image counts, at the cost of the walls only.
     Pixels that fall outside map 1 belong to the union.
     """
-    col, row = np.floor(T_1_2_px.apply(black_2_px)).astype(np.intp).T
+    x, y = black_2_px.T
+    c, s = math.cos(T_1_2_px.theta), math.sin(T_1_2_px.theta)
     height, width = image_1.shape
+    col, row = c * x - s * y + T_1_2_px.x, s * x + c * y + T_1_2_px.y
     inside = (col >= 0) & (col < width) & (row >= 0) & (row < height)
-    black_1 = int(np.count_nonzero(image_1 == BLACK))
-    shared = int(np.count_nonzero(image_1[row[inside], col[inside]] == BLACK))
-    shared = min(shared, black_1)
+    pixel = row[inside].astype(np.intp) * width + col[inside].astype(np.intp)
+    black_1 = image_1.size - cv2.countNonZero(image_1) if image_1.size else 0
+    shared = min(int(np.count_nonzero(image_1.ravel()[pixel] == BLACK)), black_1)
     union = black_1 + len(black_2_px) - shared
     return shared / union if union else 0.0
 

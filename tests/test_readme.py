@@ -1,0 +1,65 @@
+"""The README's examples run as they stand; what it says of commands is what the project does."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def blocks(language: str) -> list[object]:
+    found = []
+    for document in DOCUMENTS:
+        text = document.read_text(encoding="utf-8")
+        for number, block in enumerate(re.findall(rf"^```{language}\n(.*?)^```$", text, re.M | re.S), 1):
+            found.append(pytest.param(block, id=f"{document.name}-{number}"))
+    return found
+
+
+@pytest.fixture
+def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder with the example maps in it, as in a clone."""
+    shutil.copytree(ROOT / "examples" / "maps", tmp_path / "examples" / "maps")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("block", blocks("python"))
+def test_python_examples_run(block: str, workplace: Path) -> None:
+    run = subprocess.run([sys.executable, "-W", "error", "-c", block], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+
+
+@pytest.mark.parametrize("block", blocks("console"))
+def test_commands_run_and_exit_as_shown(block: str, workplace: Path) -> None:
+    commands = re.findall(r"^\$ (.*)$", block, re.M)
+    assert commands, "a console block shows commands after '$ '"
+    for command in commands:
+        assert command.startswith("mapmeld "), command
+        command, _, comment = command.partition("  #")
+        expected = int(match[1]) if (match := re.search(r"exit code (\d)", comment)) else 0
+        run = subprocess.run(
+            [sys.executable, "-m", *command.split()], capture_output=True, text=True, stdin=subprocess.DEVNULL
+        )
+        assert run.returncode == expected, f"{command}\n{run.stdout}\n{run.stderr}"
+
+
+def test_the_readme_has_the_two_set_up_commands_and_ci_runs_the_second() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for marker in ("demo", "tests"):
+        block = re.search(rf"<!-- {marker} -->\n```\n(.*?)\n```", text, re.S)
+        assert block, f"the README has no command marked {marker}"
+        assert "\n" not in block[1]
+    assert "README.md" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda d: d.name)
+def test_links_and_pictures_exist(document: Path) -> None:
+    for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", document.read_text(encoding="utf-8")):
+        if "://" not in target:
+            assert (document.parent / target).exists(), target
