@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from mapmeld.io import MapFileError
-from mapmeld.io import atomic
 from mapmeld.io.atomic import check_targets, write_files
 
 
@@ -81,15 +80,13 @@ def test_names_no_file_can_have(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("force", [False, True])
-def test_a_full_disk_leaves_nothing_new(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, force: bool
-) -> None:
+def test_a_full_disk_leaves_nothing_new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, force: bool) -> None:
     (tmp_path / "old").write_text("old")
 
     def full(descriptor: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(atomic.os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(MapFileError, match=r"a: cannot be written: No space left on device"):
         write_files([(tmp_path / "a", (b"x",)), (tmp_path / "b", (b"x",))], force=force)
     assert names(tmp_path) == ["old"]
@@ -99,7 +96,7 @@ def test_an_interruption_leaves_nothing_new(tmp_path: Path, monkeypatch: pytest.
     def interrupted(descriptor: int) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(atomic.os, "fsync", interrupted)
+    monkeypatch.setattr(os, "fsync", interrupted)
     with pytest.raises(KeyboardInterrupt):
         write_files([(tmp_path / "a", (b"x",))])
     assert names(tmp_path) == []
@@ -118,8 +115,8 @@ def test_a_file_that_appears_in_the_last_moment_is_safe(
     def refused(source: Path, target: Path) -> None:
         raise OSError(95, "Operation not supported")
 
-    monkeypatch.setattr(atomic.os, "fsync", rival)
-    monkeypatch.setattr(atomic.os, "link", link if links else refused)
+    monkeypatch.setattr(os, "fsync", rival)
+    monkeypatch.setattr(os, "link", link if links else refused)
     with pytest.raises(MapFileError, match="b: exists already"):
         write_files([(tmp_path / "a", (b"x",)), (tmp_path / "b", (b"x",))])
     assert names(tmp_path) == ["b"]
@@ -130,7 +127,7 @@ def test_file_systems_without_hard_links(tmp_path: Path, monkeypatch: pytest.Mon
     def refused(source: Path, target: Path) -> None:
         raise OSError(95, "Operation not supported")
 
-    monkeypatch.setattr(atomic.os, "link", refused)
+    monkeypatch.setattr(os, "link", refused)
     write_files([(tmp_path / "a", (b"x",)), (tmp_path / "b", (b"y",))])
     assert names(tmp_path) == ["a", "b"]
     assert (tmp_path / "b").read_text() == "y"

@@ -397,13 +397,12 @@ def _check_png(data: NDArray[np.uint8], header: _PngHeader, path: AnyPath) -> in
                 if seen > header.raw_bytes:
                     raise MapFileError.of(path, "does not fit its header: the PNG image has too many rows")
                 waiting = inflate.unconsumed_tail
-                # Output can still be due when all input is taken, so a full piece means: ask again.
-                if not waiting and rows.size < _CHUNK_BYTES:
+                if not waiting:
                     break
         elif name == b"IEND":
             break
         at = end
-    if seen < header.raw_bytes:
+    if seen < header.raw_bytes or not inflate.eof:
         _truncated(path, "PNG")
     return transparent
 

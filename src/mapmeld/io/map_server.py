@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 MAX_YAML_BYTES = 1 << 16
 """Largest YAML file that is read; map_server writes about 150 bytes."""
 
+MAX_YAML_DEPTH = 20
+"""Deepest nesting that is read; the parser's time grows with the square of it."""
+
 # The greys of mode "trinary".
 FREE_GREY, UNKNOWN_GREY, OCCUPIED_GREY = 254, 205, 0
 
@@ -174,10 +177,8 @@ def _cell_of_sum(
     summed: int, maxval: int, mode: Mode, negate: bool, occupied_thresh: float, free_thresh: float
 ) -> Cells:
     """Return the cell for every sum of `summed` samples of 0..maxval."""
-    # nav2 computes with 16-bit samples; to divide in its order keeps even the last bit.
-    widen = 257 if maxval == 255 else 1
     sums = np.arange(summed * maxval + 1, dtype=np.float64)
-    shade = sums * widen / summed / (maxval * widen)
+    shade = sums / summed / maxval
     if mode == "raw":
         scaled = shade * 255
         percent = np.floor(scaled) + (scaled - np.floor(scaled) >= 0.5)  # halves go up
@@ -289,17 +290,19 @@ class _Fields:
                 )
             data = file.read(MAX_YAML_BYTES)
         try:
-            text = data.decode("utf-8-sig")
+            text = data.decode("utf-8")
         except UnicodeDecodeError:
             self.fail("is not a YAML file (it is not UTF-8 text); an image needs the format 'image'")
         try:
             self._collect(yaml.parse(text, Loader=yaml.SafeLoader))
         except yaml.MarkedYAMLError as error:
             where = f" in line {error.problem_mark.line + 1}" if error.problem_mark else ""
-            hint = " (YAML takes spaces, not tabs)" if "\\t" in str(error.problem) else ""
-            self.fail(f"is not valid YAML{where}: {error.problem or error.context}{hint}")
-        except yaml.YAMLError as error:
-            self.fail(f"is not valid YAML: {' '.join(str(error).split())}")
+            problem = str(error.problem or error.context)
+            hint = " (YAML takes spaces, not tabs)" if "\\t" in problem else ""
+            self.fail(f"is not valid YAML{where}: {problem[:150]}{hint}")
+        # Characters and versions with numbers out of range get past the parser's own errors.
+        except (yaml.YAMLError, ValueError, OverflowError) as error:
+            self.fail(f"is not valid YAML: {' '.join(str(error).split())[:150]}")
 
     def fail(self, problem: str) -> NoReturn:
         raise MapFileError.of(self._path, problem)
@@ -308,7 +311,7 @@ class _Fields:
     def _collect(self, events: Iterator[yaml.Event]) -> None:
         import yaml
 
-        events = map(self._plain, events)
+        events = self._harmless(events)
         begun = False
         for event in events:
             if isinstance(event, yaml.MappingStartEvent):
@@ -347,18 +350,25 @@ class _Fields:
                 items.append(_Scalar(event.value, quoted=event.style is not None))
         return items if is_list else _Nested()
 
-    def _plain(self, event: yaml.Event) -> yaml.Event:
-        """Refuse what could multiply (aliases) or make objects (tags)."""
+    def _harmless(self, events: Iterator[yaml.Event]) -> Iterator[yaml.Event]:
+        """Refuse what could multiply (aliases), make objects (tags) or keep the parser busy (depth)."""
         import yaml
 
-        if isinstance(event, yaml.NodeEvent):
-            line = _line(event)
-            if event.anchor is not None:
-                self.fail(f"uses a YAML anchor or alias in line {line}, which a map has no need of")
-            tag = getattr(event, "tag", None)
+        depth = 0
+        for event in events:
+            if isinstance(event, yaml.NodeEvent) and event.anchor is not None:
+                self.fail(f"uses a YAML anchor or alias in line {_line(event)}, which a map has no need of")
+            tag = getattr(event, "tag", None) if isinstance(event, yaml.NodeEvent) else None
             if tag is not None:
-                self.fail(f"uses the YAML tag {_short(tag)} in line {line}, which a map has no need of")
-        return event
+                self.fail(
+                    f"uses the YAML tag {_short(tag)} in line {_line(event)}, which a map has no need of"
+                )
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            if depth > MAX_YAML_DEPTH:
+                self.fail(
+                    f"nests more than {MAX_YAML_DEPTH} levels deep in line {_line(event)}; a map takes two"
+                )
+            yield event
 
     # ------------------------------------------------------------------ values by kind
     def text(self, key: str, default: str | None = None) -> str:
