@@ -110,7 +110,7 @@ def load(
         found = next((kind for kind in FORMATS.values() if ending in kind.suffixes), None)
         if found is None:
             known = " ".join(suffix for kind in FORMATS.values() for suffix in kind.suffixes)
-            raise MapFileError.of(name, f"not a known kind of map file (known: {known}); name its format")
+            raise MapFileError.of(name, f"not a known kind of map file (known: {known})")
         return found.read(name, resolution)
     if format not in FORMATS:
         raise MapFileError.of(name, f"no map format is called {format!r} (there are: {', '.join(FORMATS)})")

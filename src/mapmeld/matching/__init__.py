@@ -1,6 +1,15 @@
 """Matchers: two occupancy grids in, one `MatchResult` out."""
 
-from mapmeld.matching.match import METHODS, Method, UnknownMethodError, match
+from mapmeld.matching.match import METHODS, Method, UnknownMethodError, match, method_named
 from mapmeld.matching.result import Alternative, MatchResult, Verdict
 
-__all__ = ["METHODS", "Alternative", "MatchResult", "Method", "UnknownMethodError", "Verdict", "match"]
+__all__ = [
+    "METHODS",
+    "Alternative",
+    "MatchResult",
+    "Method",
+    "UnknownMethodError",
+    "Verdict",
+    "match",
+    "method_named",
+]

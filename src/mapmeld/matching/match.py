@@ -10,6 +10,16 @@ from typing import Any
 from mapmeld.errors import MapmeldError
 from mapmeld.grid import OccupancyGrid
 from mapmeld.matching.alphabet import AlphabetParameters, match_alphabet
+from mapmeld.matching.baselines import (
+    FeatureAkazeParameters,
+    FeatureOrbParameters,
+    FourierMellinParameters,
+    HoughSpectrumParameters,
+    match_feature_akaze,
+    match_feature_orb,
+    match_fourier_mellin,
+    match_hough_spectrum,
+)
 from mapmeld.matching.result import MatchResult
 
 
@@ -28,6 +38,16 @@ class Method:
 
 METHODS: Mapping[str, Method] = {
     "alphabet": Method(match_alphabet, AlphabetParameters, "the paper's alphabet of corner relations"),
+    "feature_orb": Method(match_feature_orb, FeatureOrbParameters, "ORB features, as multirobot_map_merge"),
+    "feature_akaze": Method(
+        match_feature_akaze, FeatureAkazeParameters, "AKAZE features, as multirobot_map_merge"
+    ),
+    "hough_spectrum": Method(
+        match_hough_spectrum, HoughSpectrumParameters, "Hough spectra and projections (Carpin 2008)"
+    ),
+    "fourier_mellin": Method(
+        match_fourier_mellin, FourierMellinParameters, "Fourier magnitudes, phase correlation (Reddy 1996)"
+    ),
 }
 
 

@@ -6,7 +6,6 @@ and row 0 at the bottom, pictures have row 0 at the top.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -103,7 +102,7 @@ def whole_scale(cells: int, long_side_px: int = LONG_SIDE_PX) -> float:
     The picture's long side comes near `long_side_px`; it is shrunk only if it would be twice as long.
     """
     if cells > _LONGEST_UNSHRUNK * long_side_px:
-        return 1 / math.ceil(cells / (_LONGEST_UNSHRUNK * long_side_px))
+        return 1 / round(cells / long_side_px)
     return float(max(1, round(long_side_px / max(cells, 1))))
 
 
@@ -153,8 +152,11 @@ def _shrink(labels: Labels, times: int) -> Labels:
     """Return the greatest label of every block of times x times cells, counted from the lower left."""
     rows, cols = labels.shape
     padded = np.pad(labels, ((0, -rows % times), (0, -cols % times)))
-    blocks = padded.reshape(padded.shape[0] // times, times, padded.shape[1] // times, times)
-    return np.asarray(blocks.max(axis=(1, 3)), dtype=np.uint8)
+    greatest = padded[::times, ::times].copy()
+    for row in range(times):
+        for col in range(times):
+            np.maximum(greatest, padded[row::times, col::times], out=greatest)
+    return greatest
 
 
 # ---------------------------------------------------------------------- maps
@@ -163,7 +165,9 @@ GREYS: tuple[Colour, ...] = (UNKNOWN_GREY, FLOOR_WHITE, WALL_BLACK)
 
 def grey_labels(grid: OccupancyGrid) -> Labels:
     """Return labels for `GREYS`: 0 unknown or undecided, 1 floor, 2 obstacle."""
-    return (grid.free + 2 * grid.occupied).astype(np.uint8)
+    labels = grid.free.astype(np.uint8)
+    labels[grid.occupied] = 2
+    return labels
 
 
 def paint_map(grid: OccupancyGrid, window: Window | None = None, px_per_cell: float | None = None) -> Canvas:

@@ -187,6 +187,7 @@ def _preprocessing(pair: _Pair, p: AlphabetParameters) -> list[Figure]:
         stages.changes(
             "04_dilated_twice.png",
             "Two dilations make the walls as thin as before; gaps that were closed stay closed.",
+            "02",
         )
     )
     stages.apply(lambda image: thicken_walls(image, 1))
@@ -199,7 +200,9 @@ def _preprocessing(pair: _Pair, p: AlphabetParameters) -> list[Figure]:
     )
     stages.apply(lambda image: thin_walls(image, 1))
     figures.append(
-        stages.changes("07_dilated.png", "One dilation; this is what corners and similarity are taken from.")
+        stages.changes(
+            "07_dilated.png", "One dilation; this is what corners and similarity are taken from.", "04"
+        )
     )
     return figures
 
@@ -219,8 +222,8 @@ class _Stages:
         labels = [(image == BLACK).astype(np.uint8) for image in self._images]
         return self._pair.figure(name, self._pair.paint(labels, _BLACK_ON_WHITE), caption)
 
-    def changes(self, name: str, caption: str) -> Figure:
-        """Colour what has changed since the last time that changes were shown."""
+    def changes(self, name: str, caption: str, since: str) -> Figure:
+        """Colour what has changed since picture `since`, the last one that changes were shown in."""
         labels = []
         for before, after in zip(self._before, self._images, strict=True):
             label = (after == BLACK).astype(np.uint8)
@@ -228,7 +231,7 @@ class _Stages:
             label[(before == WHITE) & (after == BLACK)] = 3
             labels.append(label)
         self._before = list(self._images)
-        legend = [(GREEN, "turned black"), (RED, "turned white")]
+        legend = [(GREEN, f"turned black since {since}"), (RED, f"turned white since {since}")]
         legend = [
             entry for entry, n in zip(legend, (3, 2), strict=True) if any((x == n).any() for x in labels)
         ]
@@ -303,7 +306,7 @@ def _letters(
     caption = (
         f"Letter {i + 1} of a and letter {z + 1} of b, the {which} matching point of the best fitting: of "
         f"their {relations[0]} and {relations[1]} relations, {len(common)} agree in length and, after the "
-        f"turn of {math.degrees(T_1_2_px.theta):.1f} degrees, in direction (gamma {int(matching.gamma[i, z])})."
+        f"turn of {math.degrees(T_1_2_px.theta):.1f} degrees, in direction (gamma {matching.gamma[i, z]})."
     )
     legend = [(PAIR_COLOURS[0], "agrees, each in its own colour"), (FAINT, "has no partner")]
     return pair.figure(name, canvases, caption, legend)

@@ -1,0 +1,5 @@
+"""``python -m mapmeld``."""
+
+from mapmeld.cli import main
+
+main()

@@ -1,0 +1,38 @@
+"""Reading the maps that a command names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mapmeld.grid import OccupancyGrid
+
+
+def load_maps(paths: Sequence[str], resolution: float | None) -> list[OccupancyGrid]:
+    """Read maps; the resolution [m] is for those among them that are bare images.
+
+    Raises
+    ------
+    MapFileError
+        A map cannot be read, or a resolution is given though no map needs one.
+    """
+    from mapmeld.io import FORMATS, MapFileError, load
+
+    bare = [Path(path).suffix.lower() in FORMATS["image"].suffixes for path in paths]
+    if resolution is not None and not any(bare):
+        raise MapFileError("--resolution is for bare images; these maps state their own")
+    return [
+        load(path, resolution=resolution if is_bare else None)
+        for path, is_bare in zip(paths, bare, strict=True)
+    ]
+
+
+def names_of(paths: Sequence[str]) -> list[str]:
+    """Return the shortest ends of the paths that tell them apart: usually the file names."""
+    for depth in range(1, max((len(Path(path).parts) for path in paths), default=1) + 1):
+        names = ["/".join(Path(path).parts[-depth:]) for path in paths]
+        if len(set(names)) == len(names):
+            return names
+    return list(paths)

@@ -1,0 +1,134 @@
+"""``mapmeld merge A B ... -o OUT.yaml``."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mapmeld.cli.errors import NO_MATCH, say
+from mapmeld.cli.options import Force, Fusion, Json, Method, ParamsFile, Resolution, Settings, WriteMode
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from mapmeld.grid import OccupancyGrid
+    from mapmeld.merging import MergeResult
+    from mapmeld.report import Picture
+
+
+def merge(
+    maps: Annotated[
+        list[str], typer.Argument(metavar="MAP", help="Two or more maps; the first gives the frame.")
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="YAML", help="The merged map to write.")],
+    fusion: Annotated[
+        Fusion, typer.Option(help="What a cell becomes that several maps know.")
+    ] = Fusion.COLOUR,
+    mode: Annotated[
+        WriteMode, typer.Option(help="trinary: free, occupied, unknown; scale and raw keep percentages.")
+    ] = WriteMode.TRINARY,
+    partial: Annotated[
+        bool,
+        typer.Option("--partial", help="Write what could be joined to the first map, even if it is not all."),
+    ] = False,
+    overlay: Annotated[
+        Path | None,
+        typer.Option(metavar="PNG", help="Also draw the maps over one another, in colours."),
+    ] = None,
+    force: Force = False,
+    json: Json = False,
+    method: Method = "alphabet",
+    params: ParamsFile = None,
+    settings: Settings = None,
+    resolution: Resolution = None,
+) -> None:
+    """Match maps, merge those that fit, and write the merged map.
+
+    If some map cannot be joined, says why, writes nothing (but see --partial) and exits with 1.
+    """
+    from mapmeld.cli.maps import load_maps, names_of
+    from mapmeld.cli.parameters import effective_parameters
+    from mapmeld.cli.progress import working
+    from mapmeld.merging import merge as merge_maps
+
+    if len(maps) < 2:
+        raise typer.BadParameter("two maps or more are needed", param_hint="MAP")
+    _check_outputs(out, mode, overlay, force)
+    parameters = effective_parameters(method, params, settings)
+    started = time.perf_counter()
+    with working(f"Matching and merging {len(maps)} maps"):
+        grids = load_maps(maps, resolution)
+        result = merge_maps(grids, method=method, parameters=parameters, fusion=fusion)
+    seconds = time.perf_counter() - started
+    files: tuple[Path, ...] = ()
+    if result.complete or (partial and result.joints):
+        with working("Writing"):
+            files = _write(result, grids, names_of(maps), out, mode, overlay, force)
+
+    if json:
+        from mapmeld.cli.json_output import as_json, merge_fields
+
+        typer.echo(as_json(merge_fields(result, method, parameters, fusion, maps, files, seconds)))
+    else:
+        from mapmeld.cli.tables import print_files, print_lines, print_merge
+
+        print_merge(result, names_of(maps))
+        if files:
+            print_files(files)
+        else:
+            print_lines("", "Nothing written.")
+    if files and mode is WriteMode.TRINARY and fusion in (Fusion.LOG_ODDS, Fusion.AVERAGE):
+        say(f"note: {out} keeps only free, occupied and unknown; --mode scale keeps the percentages")
+    if not result.complete:
+        raise typer.Exit(NO_MATCH)
+
+
+def _check_outputs(out: Path, mode: WriteMode, overlay: Path | None, force: bool) -> None:
+    """Find out before the work that its outcome could not be written."""
+    from mapmeld.io import MapFileError
+    from mapmeld.io.atomic import check_targets
+
+    if out.suffix.lower() not in (".yaml", ".yml"):
+        raise MapFileError.of(
+            out, "a map is written as a .yaml file with an image beside it; end it in .yaml"
+        )
+    image = out.with_suffix(".png" if mode is WriteMode.SCALE else ".pgm")
+    check_targets([out, image], force=force)
+    if overlay is not None:
+        from mapmeld.report import check_picture_path
+
+        check_picture_path(overlay, force=force)
+        if overlay.absolute() == image.absolute():
+            raise MapFileError.of(overlay, "is the image of the merged map; give the overlay another name")
+
+
+def _write(
+    result: MergeResult,
+    grids: Sequence[OccupancyGrid],
+    names: Sequence[str],
+    out: Path,
+    mode: WriteMode,
+    overlay: Path | None,
+    force: bool,
+) -> tuple[Path, ...]:
+    from mapmeld.io import save
+
+    picture = None if overlay is None else _overlay(result, grids, names)
+    files = save(result.grid, out, mode=mode.value, force=force)
+    if overlay is not None and picture is not None:
+        from mapmeld.report import write_picture
+
+        files += (write_picture(picture, overlay, force=force),)
+    return files
+
+
+def _overlay(result: MergeResult, grids: Sequence[OccupancyGrid], names: Sequence[str]) -> Picture:
+    from mapmeld.report import overlay
+
+    joined = [i for i, pose in enumerate(result.poses) if pose is not None]
+    poses = [pose for pose in result.poses if pose is not None]
+    caption = f"{len(joined)} maps in the frame of {names[0]}."
+    return overlay([grids[i] for i in joined], poses, [names[i] for i in joined], caption)

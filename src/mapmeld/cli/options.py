@@ -1,0 +1,53 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+# Texts, not Paths: later formats put more than a file name into them.
+MapA = Annotated[
+    str, typer.Argument(metavar="A", help="A map: YAML file of map_server or nav2, or a bare image.")
+]
+MapB = Annotated[str, typer.Argument(metavar="B", help="The map to lay on A.")]
+
+Method = Annotated[
+    str, typer.Option("--method", metavar="NAME", help="How to match; a wrong name makes it list them all.")
+]
+ParamsFile = Annotated[
+    Path | None,
+    typer.Option("--params", metavar="FILE", help="YAML file with settings of the method."),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="One setting of the method; may be repeated."),
+]
+Resolution = Annotated[
+    float | None,
+    typer.Option("--resolution", metavar="METRES", help="Side of a cell in maps that are bare images."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead (see docs/json.md).")]
+Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
+PictureOut = Annotated[Path, typer.Option("-o", "--out", metavar="PNG", help="The picture to write.")]
+FolderOut = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="The folder to write.")]
+
+
+class Fusion(StrEnum):
+    """The rules of `mapmeld.merging.FUSIONS`, listed here so that help need not import them."""
+
+    COLOUR = "colour"
+    LOG_ODDS = "log-odds"
+    AVERAGE = "average"
+    NEWEST = "newest"
+    VOTE = "vote"
+
+
+class WriteMode(StrEnum):
+    """The modes of `mapmeld.io.save`."""
+
+    TRINARY = "trinary"
+    SCALE = "scale"
+    RAW = "raw"

@@ -1,0 +1,35 @@
+"""How good is a matcher: data sets with known truth, trials, scores, calibration, tables, pictures.
+
+The steps of a benchmark: `read_dataset`, `plan_trials`, `run_trials`, `summaries`; rows are kept by
+`mapmeld.evaluation.store` and drawn by `mapmeld.evaluation.plots` (extra `benchmark`).
+"""
+
+from mapmeld.evaluation.pairs import Dataset, DatasetError, Kind, Pair, read_dataset
+from mapmeld.evaluation.plan import PlanError, Trial, plan_trials
+from mapmeld.evaluation.rows import TrialRow
+from mapmeld.evaluation.score import PoseErrors, Tolerance, accuracy, overlap_centroid, pose_errors
+from mapmeld.evaluation.tables import Summary, markdown_table, rich_table, summaries
+from mapmeld.evaluation.trials import WorkerDiedError, run_trials
+
+__all__ = [
+    "Dataset",
+    "DatasetError",
+    "Kind",
+    "Pair",
+    "PlanError",
+    "PoseErrors",
+    "Summary",
+    "Tolerance",
+    "Trial",
+    "TrialRow",
+    "WorkerDiedError",
+    "accuracy",
+    "markdown_table",
+    "overlap_centroid",
+    "plan_trials",
+    "pose_errors",
+    "read_dataset",
+    "rich_table",
+    "run_trials",
+    "summaries",
+]

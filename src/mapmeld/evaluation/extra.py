@@ -1,0 +1,29 @@
+"""The optional libraries of the benchmark, imported where they are used."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from mapmeld.errors import MapmeldError
+
+
+class MissingExtraError(MapmeldError):
+    """A library of the extra `benchmark` is not installed."""
+
+
+def required(module: str) -> Any:
+    """Import a module of the extra `benchmark`.
+
+    Raises
+    ------
+    MissingExtraError
+        It is not installed; the message has the command that installs it.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        library = module.partition(".")[0]
+        raise MissingExtraError(
+            f'{library} is needed for this and cannot be imported ({error}): pip install "mapmeld[benchmark]"'
+        ) from error

@@ -1,0 +1,81 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from running import run, run_for_real
+
+import mapmeld
+from mapmeld.cli.options import Fusion, WriteMode
+from mapmeld.io import Mode
+from mapmeld.merging import FUSIONS
+
+COMMANDS = ("match", "merge", "show", "explain", "demo")
+
+
+def test_help_names_every_command_and_the_exit_codes() -> None:
+    outcome = run("--help")
+    assert outcome.code == 0
+    assert all(command in outcome.out for command in COMMANDS)
+    assert "Exit codes" in outcome.out
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(command: str) -> None:
+    assert run(command, "--help").code == 0
+    assert run(command, "-h").code == 0
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["merge", "--help"]])
+def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
+    script = (
+        "import sys\n"
+        f"sys.argv = ['mapmeld', *{arguments!r}]\n"
+        "from mapmeld.cli import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'cv2', 'scipy', 'yaml', 'mapmeld.matching', 'mapmeld.grid'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_version() -> None:
+    outcome = run("--version")
+    assert (outcome.code, outcome.out) == (0, f"mapmeld {mapmeld.__version__}\n")
+
+
+def test_without_a_command_there_is_help_and_exit_code_2(tmp_path: Path) -> None:
+    outcome = run_for_real(cwd=tmp_path)
+    assert outcome.code == 2
+    assert "merge" in outcome.out + outcome.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["frobnicate"], "frobnicate"),
+        (["--frobnicate"], "--frobnicate"),
+        (["match", "a.yaml"], "'B'"),
+        (["match", "a.yaml", "b.yaml", "--resolution", "wide"], "--resolution"),
+        (["merge", "a.yaml", "-o", "m.yaml"], "two maps"),
+        (["merge", "a.yaml", "b.yaml"], "--out"),
+        (["merge", "a.yaml", "b.yaml", "-o", "m.yaml", "--fusion", "glue"], "colour"),
+        (["merge", "a.yaml", "b.yaml", "-o", "m.yaml", "--mode", "fancy"], "trinary"),
+        (["show", "a.yaml", "-o", "p.png", "--transform", "1,2,3"], "second map"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_code_2(
+    arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    outcome = run(*arguments)
+    assert outcome.code == 2
+    assert outcome.out == ""
+    assert said in outcome.line
+    assert outcome.line.startswith("mapmeld: ")
+
+
+def test_what_help_lists_is_what_there_is() -> None:
+    assert [str(f) for f in Fusion] == list(FUSIONS)
+    assert [str(m) for m in WriteMode] == list(Mode.__args__)  # type: ignore[attr-defined]

@@ -1,0 +1,151 @@
+import json
+import math
+import os
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from running import T_A_B, run, run_for_real, write_maps
+
+from mapmeld.matching import METHODS, MatchResult, Verdict
+from mapmeld.se2 import Pose2
+
+
+def test_an_accepted_match(tmp_path: Path) -> None:
+    a, b = write_maps(tmp_path, "a", "b")
+    outcome = run("match", a, b)
+    assert outcome.code == 0
+    assert outcome.err == ""
+    rows = dict(line.split(maxsplit=1) for line in outcome.out.splitlines())
+    assert rows["verdict"] == "accepted"
+    assert rows["probability"] == "-"
+    assert "Jaccard similarity" in rows["reason"]
+    x, y, theta = (float(rows["T_a_b"].split()[i]) for i in (1, 4, 7))
+    assert math.hypot(x - T_A_B.x, y - T_A_B.y) < 0.2
+    assert theta == pytest.approx(math.degrees(T_A_B.theta), abs=1)
+
+
+def test_nothing_to_match_on_is_an_answer_not_an_error(tmp_path: Path) -> None:
+    a, empty = write_maps(tmp_path, "a", "empty")
+    outcome = run("match", a, empty)
+    assert outcome.code == 1
+    assert "rejected" in outcome.out
+    assert "nothing to match on" in outcome.out
+    parsed = json.loads(run("match", a, empty, "--json").out)
+    assert parsed["T_a_b"] is None
+    assert parsed["alternatives"] == []
+
+
+def test_json_is_all_of_stdout(tmp_path: Path) -> None:
+    a, b = write_maps(tmp_path, "a", "b")
+    outcome = run_for_real("match", a.name, b.name, "--json", "--set", "corners=40", cwd=tmp_path)
+    assert outcome.code == 0
+    assert outcome.err == ""
+    parsed = json.loads(outcome.out)
+    assert parsed["schema"] == "mapmeld.match/1"
+    assert parsed["maps"] == {"a": "a.yaml", "b": "b.yaml"}
+    assert parsed["verdict"] == "accepted"
+    assert parsed["parameters"]["corners"] == 40
+    found = Pose2(**parsed["T_a_b"])
+    assert found.distance_to(T_A_B)[0] < 0.2
+    assert found.distance_to(T_A_B)[1] < math.radians(1)
+
+
+def test_covariance_and_probability_are_passed_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    a, b = write_maps(tmp_path, "a", "b")
+    answer = MatchResult(
+        Pose2(1, 2, 3), Verdict.AMBIGUOUS, "two ways", 0.5, 0.4, 0.3, np.diag([1.0, 2.0, 3.0])
+    )
+    monkeypatch.setattr("mapmeld.matching.match", lambda *_: answer)
+    outcome = run("match", a, b, "--json")
+    assert outcome.code == 1
+    parsed = json.loads(outcome.out)
+    assert parsed["probability"] == 0.5
+    assert parsed["covariance"] == [[1, 0, 0], [0, 2, 0], [0, 0, 3]]
+    assert "0.500" in run("match", a, b).out
+
+
+@pytest.mark.parametrize("text", ["resolution: nan", "- 1", "!!python/object:os.system {}", "\0", ""])
+def test_a_bad_map_is_one_line_that_names_it(tmp_path: Path, text: str) -> None:
+    (a,) = write_maps(tmp_path, "a")
+    bad = tmp_path / "bad.yaml"
+    bad.write_text(text)
+    for flags in ([], ["--json"]):
+        outcome = run("match", a, bad, *flags)
+        assert outcome.code == 2
+        assert outcome.out == ""
+        assert "bad.yaml" in outcome.line
+
+
+def test_a_missing_map_in_a_real_run(tmp_path: Path) -> None:
+    (a,) = write_maps(tmp_path, "a")
+    outcome = run_for_real("match", a, "nowhere.yaml", cwd=tmp_path)
+    assert outcome.code == 2
+    assert outcome.out == ""
+    assert "nowhere.yaml" in outcome.line
+
+
+def test_an_unknown_method(tmp_path: Path) -> None:
+    outcome = run("match", *write_maps(tmp_path, "a", "b"), "--method", "magic")
+    assert outcome.code == 2
+    assert all(name in outcome.line for name in METHODS)
+
+
+def test_bare_images_need_a_resolution(tmp_path: Path) -> None:
+    a, b = write_maps(tmp_path, "a", "b")
+    image = b.with_suffix(".pgm")
+    assert run("match", a, image).code == 2
+    # The YAML file keeps its own resolution; only the image gets the one that is given.
+    assert run("match", a, image, "--resolution", 0.05).code == 0
+    outcome = run("match", a, b, "--resolution", 0.05)
+    assert outcome.code == 2
+    assert "bare images" in outcome.line
+    assert run("match", a, image, "--resolution", "nan").code == 2
+
+
+def test_settings_reach_the_method(tmp_path: Path) -> None:
+    maps = write_maps(tmp_path, "a", "b")
+    strict = tmp_path / "strict.yaml"
+    strict.write_text("accept_similarity: 0.99\n")
+    assert run("match", *maps, "--params", strict).code == 1
+    # What is set on the command line wins over the file.
+    assert run("match", *maps, "--params", strict, "--set", "accept_similarity=0.1").code == 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names of any bytes are a matter of Linux")
+def test_names_that_are_no_text_can_be_printed(tmp_path: Path) -> None:
+    folder = os.fsencode(tmp_path) + b"/caf\xe9 [red]"
+    os.mkdir(folder)  # noqa: PTH102
+    a, b = write_maps(Path(os.fsdecode(folder)), "a", "b")
+    outcome = run_for_real("match", a, b, cwd=tmp_path)
+    assert outcome.code == 0, outcome.err
+    assert "[red]" in outcome.out
+    assert json.loads(run_for_real("match", a, b, "--json", cwd=tmp_path).out)["verdict"] == "accepted"
+
+
+def test_a_closed_pipe_is_no_traceback(tmp_path: Path) -> None:
+    a, b = write_maps(tmp_path, "a", "b")
+    read, write = os.pipe()
+    os.close(read)
+    import subprocess
+
+    with os.fdopen(write, "wb") as stdout:
+        done = subprocess.run(
+            [sys.executable, "-m", "mapmeld", "match", a, b, "--json"],
+            stdout=stdout,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    assert "Traceback" not in done.stderr
+
+
+def test_opencv_speaks_no_word(tmp_path: Path) -> None:
+    (a,) = write_maps(tmp_path, "a")
+    torn = tmp_path / "torn.png"
+    encoded = cv2.imencode(".png", np.zeros((50, 50), np.uint8))[1].tobytes()
+    torn.write_bytes(encoded[: len(encoded) // 2])
+    outcome = run_for_real("match", a, torn, "--resolution", "0.05", cwd=tmp_path)
+    assert outcome.code == 2
+    assert "torn.png" in outcome.line
