@@ -1,3 +1,5 @@
+from random import Random
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -20,8 +22,9 @@ def test_bins_counted_by_hand() -> None:
     right = [True, False, False, True, True]
     # Sorted: 0.1 no, 0.3 yes, 0.7 no | 0.8 yes, 0.9 yes.
     first, second = reliability(probability, right, bins=2)
-    assert (first.count, first.stated, first.observed) == (3, pytest.approx(1.1 / 3), pytest.approx(1 / 3))
-    assert (second.count, second.stated, second.observed) == (2, pytest.approx(0.85), 1.0)
+    assert (first.count, second.count) == (3, 2)
+    assert [first.stated, first.observed] == pytest.approx([1.1 / 3, 1 / 3])
+    assert [second.stated, second.observed] == pytest.approx([0.85, 1.0])
     by_hand = (3 * (1.1 / 3 - 1 / 3) + 2 * 0.15) / 5
     assert expected_calibration_error(probability, right, bins=2) == pytest.approx(by_hand)
 
@@ -47,10 +50,12 @@ def test_equal_probabilities_share_their_outcome() -> None:
 
 
 @given(answers, st.randoms())
-def test_the_order_of_answers_does_not_matter(given_: list[tuple[float, bool]], rng: object) -> None:
-    shuffled = list(given_)
-    rng.shuffle(shuffled)  # type: ignore[attr-defined]
-    plain, other = (expected_calibration_error(*zip(*a, strict=True), bins=4) for a in (given_, shuffled))
+def test_the_order_of_answers_does_not_matter(given_: list[tuple[float, bool]], rng: Random) -> None:
+    shuffled = rng.sample(given_, len(given_))
+    plain, other = (
+        expected_calibration_error([p for p, _ in listed], [y for _, y in listed], bins=4)
+        for listed in (given_, shuffled)
+    )
     assert plain == pytest.approx(other, abs=1e-12)
 
 

@@ -54,7 +54,9 @@ def test_success_versus_overlap_counted_by_hand() -> None:
     figure = success_figure(rows)
     assert figure is not None
     accepted, guessed = figure.axes
-    assert line_with_marker(accepted, "o") == (pytest.approx([0.35, 0.95]), pytest.approx([1 / 3, 1]))
+    middles, shares = line_with_marker(accepted, "o")
+    assert middles == pytest.approx([0.35, 0.95])
+    assert shares == pytest.approx([1 / 3, 1])
     assert line_with_marker(guessed, "o")[1] == pytest.approx([2 / 3, 1])
     assert [text.get_text() for text in accepted.texts] == ["3", "1"]
     assert success_figure([elsewhere()]) is None

@@ -1,5 +1,3 @@
-import os
-import stat
 import sys
 from dataclasses import fields, replace
 from pathlib import Path
@@ -16,7 +14,6 @@ from mapmeld.evaluation import TrialRow
 from mapmeld.evaluation.extra import MissingExtraError
 from mapmeld.evaluation.rows import COLUMN_KINDS
 from mapmeld.evaluation.store import StoreError, add_rows, clear_rows, gather_rows, read_rows
-from mapmeld.io import MapFileError
 
 KINDS = {
     "str": st.text(st.characters(exclude_categories=["Cs"])),
@@ -32,7 +29,7 @@ def any_row() -> st.SearchStrategy[TrialRow]:
     for field in fields(TrialRow):
         kind, _, optional = str(field.type).partition(" | ")
         values[field.name] = st.none() | KINDS[kind] if optional else KINDS[kind]
-    return st.builds(TrialRow, **values)  # type: ignore[arg-type]
+    return st.builds(TrialRow, **values)
 
 
 def parts(folder: Path) -> list[str]:
@@ -112,17 +109,18 @@ def damage(part: Path, how: str) -> None:
         part.write_bytes(content[: len(content) // 2])
     elif how == "text":
         part.write_bytes(b"not a table at all, but long enough to be one")
-    elif how == "page":  # the frame is whole, what it holds is not
-        part.write_bytes(content[:4] + bytes(len(content) // 3) + content[4 + len(content) // 3 :])
+    elif how == "digit":  # the frame is whole, and so is the text; only its checksum tells
+        assert b"name of the pair" in content
+        part.write_bytes(content.replace(b"name of the pair", b"name of the pain"))
 
 
-@pytest.mark.parametrize("how", ["empty", "cut", "text", "page"])
+@pytest.mark.parametrize("how", ["empty", "cut", "text", "digit"])
 def test_a_damaged_file_is_named_with_what_to_do(tmp_path: Path, how: str) -> None:
     add_rows(tmp_path, [row("a")])
-    add_rows(tmp_path, [row("b")])
+    add_rows(tmp_path, [row("name of the pair")])
     part = tmp_path / parts(tmp_path)[1]
     damage(part, how)
-    with pytest.raises(StoreError, match="damaged, cannot be read.*remove this file") as caught:
+    with pytest.raises(StoreError, match=r"damaged, cannot be read.*remove this file") as caught:
         read_rows(tmp_path)
     assert str(part) in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -135,7 +133,7 @@ def test_other_columns_are_refused(tmp_path: Path) -> None:
     part = tmp_path / parts(tmp_path)[0]
     table = pyarrow.parquet.read_table(part).drop_columns(["seconds"])
     pyarrow.parquet.write_table(table, part)
-    with pytest.raises(StoreError, match="other columns.*--force"):
+    with pytest.raises(StoreError, match=r"other columns.*--force"):
         read_rows(tmp_path)
 
 
@@ -151,13 +149,6 @@ def test_a_file_in_the_place_of_the_folder(tmp_path: Path) -> None:
     (tmp_path / "rows").write_text("a file")
     with pytest.raises(StoreError, match="rows: cannot be made"):
         add_rows(tmp_path / "rows", [row()])
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_disk_that_refuses(tmp_path: Path) -> None:
-    tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
-    with pytest.raises(MapFileError, match="cannot be written"):
-        add_rows(tmp_path, [row()])
 
 
 def test_without_pyarrow_the_command_that_installs_it_is_named(

@@ -61,7 +61,7 @@ def add_rows(folder: Path, rows: Sequence[TrialRow]) -> None:
         return
     parquet = required("pyarrow.parquet")
     content = io.BytesIO()
-    parquet.write_table(_table(rows), content)
+    parquet.write_table(_table(rows), content, write_page_checksum=True)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -121,7 +121,7 @@ def _remove(files: Iterable[Path]) -> None:
 def _read_part(part: Path) -> list[TrialRow]:
     pyarrow, parquet = required("pyarrow"), required("pyarrow.parquet")
     try:
-        table = parquet.ParquetFile(part).read()
+        table = parquet.ParquetFile(part, page_checksum_verification=True).read()
     except (OSError, pyarrow.ArrowException) as error:
         problem = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise StoreError(
