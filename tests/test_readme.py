@@ -13,7 +13,7 @@ DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
 def blocks(language: str) -> list[object]:
-    found = []
+    found: list[object] = []
     for document in DOCUMENTS:
         text = document.read_text(encoding="utf-8")
         for number, block in enumerate(re.findall(rf"^```{language}\n(.*?)^```$", text, re.M | re.S), 1):

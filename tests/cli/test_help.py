@@ -10,7 +10,7 @@ from mapmeld.cli.options import Fusion, WriteMode
 from mapmeld.io import Mode
 from mapmeld.merging import FUSIONS
 
-COMMANDS = ("match", "merge", "show", "explain", "demo")
+COMMANDS = ("match", "merge", "show", "explain", "demo", "benchmark")
 
 
 def test_help_names_every_command_and_the_exit_codes() -> None:

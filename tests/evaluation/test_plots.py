@@ -88,7 +88,7 @@ def test_methods_look_different_even_without_colours() -> None:
     assert len(figure.legends[0].get_texts()) == 10
 
 
-@pytest.mark.parametrize("datasets", [1, 3, 4, 5])
+@pytest.mark.parametrize("datasets", [1, 4])
 def test_files_are_pictures_whatever_the_number_of_panels(tmp_path: Path, datasets: int) -> None:
     rows = [row(dataset=f"costs $5 and $6, {n}", method="a_b^c", probability=0.8) for n in range(datasets)]
     files = write_figures(rows, tmp_path)

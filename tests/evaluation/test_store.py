@@ -5,7 +5,7 @@ from pathlib import Path
 import pyarrow  # type: ignore[import-untyped]
 import pyarrow.parquet  # type: ignore[import-untyped]
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from tiny_dataset import elsewhere, row, wrong
 
@@ -36,6 +36,7 @@ def parts(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
+@settings(max_examples=25)  # each example is written to disk, down to the platter
 @given(st.lists(any_row(), min_size=1, max_size=4, unique_by=lambda r: r.key))
 def test_what_is_written_is_read(tmp_path_factory: pytest.TempPathFactory, rows: list[TrialRow]) -> None:
     folder = tmp_path_factory.mktemp("store") / "rows"

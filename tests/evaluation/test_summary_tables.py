@@ -17,7 +17,7 @@ TRIALS = [
     row("5", verdict="ambiguous", seconds=5.0, similarity=0.4),
     wrong("6", seconds=6.0, similarity=0.2),
     wrong("7", verdict="rejected", seconds=7.0, similarity=0.3),
-    wrong("8", verdict="error", seconds=8.0, x=None, y=None, theta=None, similarity=0.0),
+    wrong("8", verdict="error", seconds=0.001, x=None, y=None, theta=None, similarity=0.0),
     elsewhere("9", verdict="rejected", seconds=9.0, similarity=0.0),
     elsewhere("10", seconds=10.0, similarity=0.1),
 ]
@@ -35,8 +35,8 @@ def test_a_summary_counted_by_hand() -> None:
     assert (s.wrong_accepts_same, s.wrong_accepts_different, s.errors) == (1, 1, 1)
     assert s.translation_error == pytest.approx(0.2)
     assert s.rotation_error == pytest.approx(math.radians(2))
-    assert s.seconds == 5.5
-    assert s.seconds_p95 == pytest.approx(9.55)
+    assert s.seconds == 5.0  # of the nine that did not fail
+    assert s.seconds_p95 == pytest.approx(9.6)
     # By similarity: three at 0.5 and one at 0.4 are above the best wrong one, of 0.3.
     assert s.recall_without_wrong == 4 / 8
     assert (s.calibration_error, s.brier, s.time_ratio) == (None, None, None)
@@ -53,6 +53,12 @@ def test_the_ratio_is_the_median_of_the_pairs_own_ratios() -> None:
     times = [(1.0, 2.0), (3.0, 1.0), (5.0, 4.0), (9.0, None)]
     rows = [row(str(n), seconds=a, against_seconds=b) for n, (a, b) in enumerate(times)]
     assert only(rows).time_ratio == 1.25
+
+
+def test_a_method_that_always_fails_has_no_time() -> None:
+    s = only([wrong(verdict="error", x=None, seconds=0.001, against_seconds=1.0)])
+    assert (s.errors, s.seconds, s.seconds_p95, s.time_ratio) == (1, None, None, None)
+    assert "| 1 |" in markdown_table([s])
 
 
 def test_only_different_places() -> None:
@@ -79,7 +85,7 @@ def test_markdown_by_hand() -> None:
     lines = markdown_table(summaries(TRIALS)).splitlines()
     assert [cell.strip() for cell in lines[2].strip("|").split("|")] == [
         *("set", "m", "8 / 2", "37.5", "62.5", "12.5", "1 / 1", "1", "50.0", "–", "–"),
-        *("0.200", "2.000", "5.5000", "9.5500"),
+        *("0.200", "2.000", "5.0000", "9.6000"),
     ]
     assert {line.count("|") for line in lines} == {16}
     assert "time ratio" not in lines[0]
@@ -115,7 +121,7 @@ def test_a_narrow_terminal_loses_columns_but_no_digits(width: int) -> None:
     assert "37.5" in text
     assert "62.5" in text
     assert "1 / 1" in text
-    assert "5.5000" in text
+    assert "5.0000" in text
     assert ("left out, the terminal is too narrow: Brier" in text) == (
         "Brier" not in text.split("left out")[0]
     )

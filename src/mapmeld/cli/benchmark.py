@@ -70,6 +70,7 @@ def benchmark(
     With --out every trial is kept as it is done: the same command goes on where the last run stopped.
     """
     from mapmeld.evaluation import markdown_table, plan_trials, read_dataset, run_trials, summaries
+    from mapmeld.evaluation.rows import ERROR
     from mapmeld.matching import METHODS
 
     sets = [read_dataset(path, pairs) for path in datasets]
@@ -122,10 +123,14 @@ def benchmark(
 
     lines = summaries(rows)
     _print(lines)
-    failed = [row for row in rows if row.verdict == "error"]
-    if failed:
-        first = failed[0]
-        say(f"{len(failed)} trials failed; the first: {first.method} on {first.pair}: {first.reason}")
+    for name in names:
+        tried = [row for row in rows if row.method == name]
+        failed = [row for row in tried if row.verdict == ERROR]
+        if failed:
+            say(
+                f"{name} failed on {len(failed)} of {len(tried)} trials, "
+                f"the first time on {failed[0].pair}: {failed[0].reason}"
+            )
     if out is not None:
         _write(out, rows, markdown_table(lines))
 
@@ -166,12 +171,14 @@ def _opened(out: Path, used: Mapping[str, object], force: bool) -> list[TrialRow
     """Write the settings of this run and return the rows of earlier ones."""
     import yaml
 
+    from mapmeld.evaluation.rows import ERROR
     from mapmeld.evaluation.store import clear_rows, read_rows
     from mapmeld.io.atomic import write_files
 
     if force:
         clear_rows(out / ROWS)
-    finished = read_rows(out / ROWS)
+    # What failed is tried again: a library that was missing may be there now.
+    finished = [row for row in read_rows(out / ROWS) if row.verdict != ERROR]
     try:
         out.mkdir(exist_ok=True)
     except OSError as error:

@@ -33,24 +33,20 @@ class Trial:
     pair
         With its overlap and its centroid, also where the data set leaves them out.
     settings
-        Settings of the method, an instance of its parameter class.
+        Settings of the method, an instance of its parameter class; `parameters` are the same as JSON.
     """
 
     dataset: str
     pair: Pair
     inputs: str
     method: str
+    parameters: str
     settings: object
     turn_seed: int | None
     swapped: bool
     time_against: str | None
     version: str
     tolerance: Tolerance
-
-    @property
-    def parameters(self) -> str:
-        """The settings as JSON."""
-        return parameters_json(self.settings)
 
     @property
     def key(self) -> TrialKey:
@@ -133,6 +129,7 @@ def plan_trials(
     if time_against is not None:
         method_named(time_against)
     settings = {name: (parameters or {}).get(name) or method_named(name).parameters() for name in methods}
+    texts = {name: parameters_json(chosen) for name, chosen in settings.items()}
     version = code_version()
 
     trials: list[Trial] = []
@@ -148,6 +145,7 @@ def plan_trials(
                     pair=pair,
                     inputs=inputs,
                     method=method,
+                    parameters=texts[method],
                     settings=settings[method],
                     turn_seed=turn_seed,
                     swapped=swap,

@@ -46,9 +46,9 @@ class Summary:
     translation_error, rotation_error
         Median errors of answers that were accepted and right [m], [rad].
     seconds, seconds_p95
-        Median and 95th percentile of the wall time.
+        Median and 95th percentile of the wall time of the trials that did not fail.
     time_ratio
-        Median of the time relative to `TrialRow.time_against` on the same maps.
+        Median of their time relative to `TrialRow.time_against` on the same maps.
     """
 
     dataset: str
@@ -66,8 +66,8 @@ class Summary:
     recall_without_wrong: float | None
     translation_error: float | None
     rotation_error: float | None
-    seconds: float
-    seconds_p95: float
+    seconds: float | None
+    seconds_p95: float | None
     time_ratio: float | None
 
 
@@ -104,7 +104,8 @@ def _summary(dataset: str, method: str, rows: Sequence[TrialRow]) -> Summary:
     stated = [row for row in rows if row.probability is not None]
     probabilities = [row.probability for row in stated if row.probability is not None]
     right = [row.right for row in stated]
-    seconds = [row.seconds for row in rows]
+    answered = [row for row in rows if row.verdict != ERROR]
+    seconds = [row.seconds for row in answered]
     return Summary(
         dataset=dataset,
         method=method,
@@ -123,9 +124,9 @@ def _summary(dataset: str, method: str, rows: Sequence[TrialRow]) -> Summary:
         ),
         translation_error=_median([row.translation_error for row in good]),
         rotation_error=_median([row.rotation_error for row in good]),
-        seconds=float(np.median(seconds)),
-        seconds_p95=float(np.percentile(seconds, 95)),
-        time_ratio=_median([row.time_ratio for row in rows]),
+        seconds=_median(seconds),
+        seconds_p95=float(np.percentile(seconds, 95)) if seconds else None,
+        time_ratio=_median([row.time_ratio for row in answered]),
     )
 
 

@@ -52,7 +52,7 @@ def run_trials(
     finished: Iterable[TrialRow] = (),
     keep: Callable[[Sequence[TrialRow]], object] | None = None,
     on_row: Callable[[TrialRow], object] | None = None,
-    batch_seconds: float = 5.0,
+    batch_seconds: float = 2.0,
 ) -> tuple[TrialRow, ...]:
     """Run trials and return their rows in the order of the trials.
 

@@ -49,7 +49,8 @@ def test_a_blank_map_has_no_corners() -> None:
 def test_they_are_opencvs_good_features_to_track(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mapmeld.matching.alphabet.corners._STRIP_ROWS", rows)
     rng = np.random.default_rng(5)
-    image = cv2.GaussianBlur(rng.integers(0, 255, (150, 200), np.uint8), (0, 0), 2)  # no two equally strong
+    noise = rng.integers(0, 255, (150, 200), np.uint8)
+    image = cv2.GaussianBlur(noise, (0, 0), 2).astype(np.uint8)  # no two corners equally strong
     ours = extract_corners(image, AlphabetParameters(corners=50, corner_spacing_px=8.0))
     theirs = cv2.goodFeaturesToTrack(image, 50, 0.2, 8.0).reshape(-1, 2) + 0.5
     np.testing.assert_array_equal(ours, theirs)

@@ -1,3 +1,4 @@
+import re
 from typing import Any
 
 import numpy as np
@@ -6,6 +7,7 @@ from drawing import drawn, office, seen_from
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mapmeld.grid import OccupancyGrid
 from mapmeld.matching import Verdict
 from mapmeld.matching.baselines import FeatureOrbParameters, match_feature_orb
 from mapmeld.matching.baselines.feature_pipeline import as_bytes, least_squares
@@ -46,8 +48,14 @@ def test_the_threshold_decides() -> None:
 
 
 def test_the_reason_names_the_scale_that_the_rigid_answer_leaves_out() -> None:
-    # The same cells with another label: the picture is equal, so the scale is 1, whatever the metres.
-    assert "scale 1.000" in match_feature_orb(A, A).reason
+    # Cells of 4 cm said to be of 5 cm: map b seems a quarter larger than it is.
+    swollen = OccupancyGrid(office(0.04).cells, 0.05)
+    result = match_feature_orb(A, swollen)
+    found = re.search(r"scale ([0-9.]+)", result.reason)
+    assert found
+    assert float(found[1]) == pytest.approx(0.8, abs=0.02)
+    assert result.T_a_b is not None
+    assert abs(result.T_a_b.theta) < 0.02
 
 
 def test_maps_too_small_for_features_are_rejected_with_the_reason() -> None:

@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 from drawing import office, seen_from
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mapmeld.matching import Verdict
@@ -28,8 +28,16 @@ def test_walls_are_drawn_about_the_middle_and_cut_at_the_edge() -> None:
     np.testing.assert_array_equal(picture, [[0, 0, 0, 0], [0, 0, 0, 0], [1, 0, 1, 0], [0, 0, 0, 0]])
 
 
+def test_a_wall_between_pixels_is_shared() -> None:
+    shared = drawn_walls(np.array([(0.0, 0.25)]), 4)
+    np.testing.assert_allclose(shared[1:3, 1:3], [[0.125, 0.125], [0.375, 0.375]])
+    assert shared.sum() == 1.0
+    assert drawn_walls(np.array([(0.5, 0.5)] * 3), 4).max() == 1.0
+
+
 @settings(max_examples=20)
 @given(st.floats(0, math.pi))
+@example(math.radians(1.75))  # where the lattice itself would answer 0, were the pictures not padded
 def test_the_rotation_is_found(turn: float) -> None:
     one = magnitudes_by_direction(WALLS, 220, 360)
     two = magnitudes_by_direction(Pose2(3.0, -4.0, -turn).apply(WALLS), 220, 360)
@@ -63,7 +71,10 @@ def test_the_threshold_decides() -> None:
     doubted = match_fourier_mellin(A, B, FourierMellinParameters(accept_response=1.0))
     assert (believed.verdict, doubted.verdict) == (Verdict.ACCEPTED, Verdict.REJECTED)
     assert doubted.T_a_b == believed.T_a_b
-    assert "below the threshold 1" in doubted.reason
+    assert "(threshold 1)" in doubted.reason
+    assert "do not both suffice" in doubted.reason
+    unlike = match_fourier_mellin(A, B, FourierMellinParameters(accept_index=1.0))
+    assert unlike.verdict is Verdict.REJECTED
 
 
 @pytest.mark.parametrize(
@@ -74,6 +85,7 @@ def test_the_threshold_decides() -> None:
         ("cell", -0.1),
         ("cell", float("inf")),
         ("accept_response", 1.5),
+        ("accept_index", -0.5),
     ],
 )
 def test_values_out_of_range_are_named(name: str, value: Any) -> None:

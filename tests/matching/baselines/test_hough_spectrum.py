@@ -27,8 +27,10 @@ def test_the_spectrum_is_highest_along_the_normal_of_the_walls() -> None:
     assert spectrum[0] == pytest.approx(80**2, rel=0.2)
 
 
-def test_the_spectrum_is_as_before_when_the_map_is_moved() -> None:
-    np.testing.assert_array_equal(hough_spectrum(ROOM, 90), hough_spectrum(ROOM + (1000, 1000), 90))
+def test_the_spectrum_is_nearly_as_before_when_the_map_is_moved() -> None:
+    # Not exactly: lines fall differently between the bins, one pixel wide.
+    moved = ROOM + np.array((1000.3, 1000.6))
+    np.testing.assert_allclose(hough_spectrum(ROOM, 90), hough_spectrum(moved, 90), rtol=0.15)
 
 
 @given(st.floats(0, math.pi))

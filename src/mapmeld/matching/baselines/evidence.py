@@ -70,7 +70,7 @@ class Evidence:
             walls_1=walls_1,
             walls_1_px=black_pixels(walls_1),
             walls_2_px=black_pixels(walls_2),
-            cells_2_px=np.stack([cols, rows], axis=-1) + 0.5,
+            cells_2_px=np.stack([cols, rows], axis=-1).astype(np.float64) + 0.5,
             is_wall_2=wall[rows, cols],
         )
 

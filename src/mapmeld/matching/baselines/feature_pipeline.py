@@ -93,7 +93,7 @@ def match_features(
         verdict=Verdict.ACCEPTED if accepted else Verdict.REJECTED,
         reason=(
             f"confidence {found.confidence:.2f} ({len(found.inliers_1_px)} inliers of "
-            f"{found.matches} matches, scale {found.scale:.3f}) is {'at least' if accepted else 'below'} "
+            f"{found.matches} matches, scale {found.scale:.3g}) is {'at least' if accepted else 'below'} "
             f"the threshold {parameters.accept_confidence:g}"
         ),
         similarity=evidence.similarity(T_1_2_px),

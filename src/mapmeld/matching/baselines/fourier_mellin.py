@@ -208,9 +208,9 @@ def match_fourier_mellin(
         T_a_b=evidence.in_metres(best),
         verdict=Verdict.ACCEPTED if accepted else Verdict.REJECTED,
         reason=(
-            f"response {height:.3f} of the phase correlation (threshold {p.accept_response:g}) and acceptance "
-            f"index {index:.3f} (threshold {p.accept_index:g}) {'both suffice' if accepted else 'do not suffice'} "
-            f"(best of {len(hypotheses)} rotations)"
+            f"response {height:.3f} of the phase correlation (threshold {p.accept_response:g}) and "
+            f"acceptance index {index:.3f} (threshold {p.accept_index:g}) "
+            f"{'both suffice' if accepted else 'do not both suffice'} (best of {len(hypotheses)} rotations)"
         ),
         similarity=evidence.similarity(best),
         overlap=evidence.overlap(best),

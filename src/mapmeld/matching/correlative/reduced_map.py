@@ -1,0 +1,128 @@
+"""A map made ready for the search: coarse rasters of its walls and floor, and which way its walls run."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapmeld.grid import FREE_UP_TO, OCCUPIED, OCCUPIED_FROM, OccupancyGrid
+from mapmeld.matching.correlative.directions import SPECTRUM_BLUR, direction_spectrum, main_direction
+from mapmeld.se2 import Pose2
+
+Image = NDArray[Any]  # bytes or float32; OpenCV's annotations say neither
+
+REDUCED_CELL = 0.2
+"""Side of a raster cell [m], about: the nearest whole multiple of the map's own cells."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReducedMap:
+    """What the search needs of one map.
+
+    All rasters have square cells of `cell` metres, row 0 at the bottom. The map's "mid" frame has the
+    raster's axes, and its origin is the middle of the smallest box around the walls that is parallel to
+    the main direction: correlations are then as small as they can be.
+
+    Attributes
+    ----------
+    wall, floor
+        0..255: obstacle (any in the reduced cell), share of free cells.
+    known
+        255 where measured, else 0.
+    middle
+        The mid frame's origin in cells of the rasters (col, row), corner based.
+    T_map_mid
+        Takes a point of the mid frame to the map's metric frame.
+    spectrum
+        How much wall runs in each direction, `BINS` bins over 180 degrees of the mid frame.
+    main_direction
+        [rad] of the mid frame, modulo a right angle.
+    points
+        Wall cell centres (n, 2) in the mid frame [m].
+    area
+        Known area [m^2].
+    """
+
+    cell: float
+    wall: Image
+    floor: Image
+    known: Image
+    middle: tuple[float, float]
+    T_map_mid: Pose2
+    spectrum: NDArray[np.float64]
+    main_direction: float
+    points: NDArray[np.float32]
+    area: float
+
+
+def reduce_map(grid: OccupancyGrid) -> ReducedMap:
+    """Reduce a map to what the search needs, in time linear in its cells."""
+    cells = grid.cells.view(np.uint8)
+    # Cut to the known cells first, so that unknown borders cannot change the answer.
+    left, bottom, width, height = (
+        cv2.boundingRect(cv2.inRange(cells, 0, OCCUPIED)) if cells.size else (0, 0, 0, 0)
+    )
+    if not width:
+        left = bottom = 0
+        width = height = 1
+        cells = np.full((1, 1), 255, np.uint8)
+    cells = np.ascontiguousarray(cells[bottom : bottom + height, left : left + width])
+    k = max(1, round(REDUCED_CELL / grid.resolution))
+    cell = grid.resolution * k
+    margin = math.ceil(4 * SPECTRUM_BLUR / cell)
+    covered = _with_border(pooled(cv2.inRange(cells, OCCUPIED_FROM, OCCUPIED), k), margin)
+    wall = cv2.inRange(covered, 1, 255)
+    floor = _with_border(pooled(cv2.inRange(cells, 0, FREE_UP_TO), k), margin)
+    floor[wall > 0] = 0
+    known = cv2.max(wall, cv2.inRange(floor, 128, 255))
+    spectrum = direction_spectrum(covered, cell)
+    main = main_direction(spectrum)
+    at_row, at_col = np.nonzero(wall)
+    points = (np.stack([at_col, at_row], axis=1).astype(np.float32) + np.float32(0.5)) * np.float32(cell)
+    middle = _middle(points, main)
+    lattice = middle / grid.resolution - margin * k
+    x, y = grid.lattice_to_metres((left + lattice[0], bottom + lattice[1]))
+    return ReducedMap(
+        cell=cell,
+        wall=wall,
+        floor=floor,
+        known=known,
+        middle=(float(middle[0] / cell), float(middle[1] / cell)),
+        T_map_mid=Pose2(float(x), float(y), grid.origin.theta),
+        spectrum=spectrum,
+        main_direction=main,
+        points=points - middle,
+        area=cv2.countNonZero(known) * cell**2,
+    )
+
+
+def _middle(points: NDArray[np.float32], direction: float) -> NDArray[np.float32]:
+    """Middle of the box around the points that is turned by `direction`."""
+    if not len(points):
+        return np.zeros(2, np.float32)
+    c, s = math.cos(direction), math.sin(direction)
+    axes = np.array([[c, s], [-s, c]], np.float32)
+    u = points @ axes.T
+    middle: NDArray[np.float32] = (u.min(axis=0) + u.max(axis=0)) / 2 @ axes
+    return middle
+
+
+def pooled(image: Image, k: int) -> Image:
+    """Average of k x k blocks; the last blocks are filled up with 0."""
+    if k == 1:
+        return image
+    if k > 15 and image.dtype == np.uint8:
+        # A single pixel must not be rounded away.
+        return np.ceil(pooled(image.astype(np.float32), k)).astype(np.uint8)
+    rows, cols = image.shape
+    image = cv2.copyMakeBorder(image, 0, -rows % k, 0, -cols % k, cv2.BORDER_CONSTANT)
+    return cv2.resize(image, (image.shape[1] // k, image.shape[0] // k), interpolation=cv2.INTER_AREA)
+
+
+def _with_border(image: Image, margin: int) -> Image:
+    return cv2.copyMakeBorder(image, margin, margin, margin, margin, cv2.BORDER_CONSTANT)
