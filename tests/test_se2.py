@@ -47,7 +47,16 @@ def test_the_matrix_does_what_the_pose_does(T: Pose2, p: tuple[float, float]) ->
     assert same(Pose2.from_matrix(T.matrix()), T)
 
 
-@pytest.mark.parametrize("matrix", [np.eye(2), np.diag([2.0, 2, 1]), np.diag([1.0, -1, 1])])
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        np.eye(2),
+        np.diag([2.0, 2, 1]),
+        np.diag([1.0, -1, 1]),
+        np.diag([1.000005, 1.000005, 1]),
+        np.array([[1, 0, np.inf], [0, 1, 0], [0, 0, 1]]),
+    ],
+)
 def test_what_is_not_a_rigid_motion_is_refused(matrix: np.ndarray) -> None:
     with pytest.raises(ValueError, match="matrix"):
         Pose2.from_matrix(matrix)

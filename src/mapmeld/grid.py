@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mapmeld.errors import MapmeldError
 from mapmeld.se2 import Pose2
 
 UNKNOWN = -1
@@ -31,6 +32,10 @@ FREE_UP_TO = 25
 
 Cells = NDArray[np.int8]
 Mask = NDArray[np.bool_]
+
+
+class ResolutionError(MapmeldError):
+    """Two cell sizes that cannot both be right."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +76,8 @@ class OccupancyGrid:
         if not all(map(math.isfinite, (self.origin.x, self.origin.y, self.origin.theta))):
             raise ValueError(f"origin must be finite, not {self.origin}")
         # A read-only copy: freezing a view would leave the caller's array writable underneath.
-        if cells.dtype != np.int8 or cells.flags.writeable or not cells.flags.c_contiguous:
+        own = cells.flags.owndata and not cells.flags.writeable
+        if cells.dtype != np.int8 or not own or not cells.flags.c_contiguous:
             cells = np.array(cells, dtype=np.int8, order="C")
             cells.flags.writeable = False
         object.__setattr__(self, "cells", cells)
@@ -183,6 +189,9 @@ class OccupancyGrid:
         return np.ascontiguousarray(image[::-1])
 
 
+MAX_RATIO = 100
+"""Most by which the cell sizes of two maps may differ; beyond it a resolution is surely mistyped."""
+
 # Rows of the target that `resample` works on at a time: bounds memory at about 100 MB.
 _BLOCK_CELLS = 1 << 20
 
@@ -209,6 +218,11 @@ def resample(
     Returns
     -------
     int8 array of the target's shape: -1 where the grid is unknown or does not reach.
+
+    Raises
+    ------
+    ResolutionError
+        The cell sizes differ by more than a factor of `MAX_RATIO`.
     """
     if keep not in ("walls", "mean"):
         raise ValueError(f"keep must be 'walls' or 'mean', not {keep!r}")
@@ -216,6 +230,12 @@ def resample(
     out = np.full((rows, cols), UNKNOWN, np.int8)
     if not (grid.cells.size and out.size):
         return out
+    ratio = target.resolution / grid.resolution
+    if not 1 / MAX_RATIO <= ratio <= MAX_RATIO:
+        raise ResolutionError(
+            f"cells of {grid.resolution:g} m and of {target.resolution:g} m cannot be laid over one another: "
+            f"they differ by more than a factor of {MAX_RATIO}; check the resolutions"
+        )
     # One affine map from target lattice to grid lattice.
     T_grid_target = grid.origin.inverse() @ T_target_grid.inverse() @ target.origin
     scale = target.resolution / grid.resolution
@@ -276,4 +296,4 @@ def overlap_share(a: OccupancyGrid, b: OccupancyGrid, T_a_b: Pose2) -> float:
     col, row = np.floor(a.metres_to_lattice(T_a_b.apply(points))).astype(np.int64).T
     inside = (col >= 0) & (col < a.shape[1]) & (row >= 0) & (row < a.shape[0])
     both = np.count_nonzero(a.cells[row[inside], col[inside]] >= 0)
-    return min(1.0, both * (b.resolution * step) ** 2 / smaller)
+    return float(min(1.0, both * (b.resolution * step) ** 2 / smaller))

@@ -70,7 +70,7 @@ class Pose2:
         if m.shape != (3, 3):
             raise ValueError(f"a 3 x 3 matrix is needed, not {m.shape}")
         pose = cls(float(m[0, 2]), float(m[1, 2]), math.atan2(m[1, 0], m[0, 0]))
-        if not np.allclose(pose.matrix(), m, atol=1e-9):
+        if not (np.isfinite(m).all() and np.allclose(pose.matrix(), m, rtol=0.0, atol=1e-9)):
             raise ValueError("the matrix is not a rigid motion of the plane")
         return pose
 

@@ -32,6 +32,20 @@ def test_rules_on_cases_counted_by_hand(fusion: str, expected: list[int]) -> Non
     assert fuse(list(CASES), fusion).tolist() == [expected]
 
 
+def test_the_colour_rule_lays_white_over_what_is_neither_black_nor_white() -> None:
+    assert fuse(
+        [np.array([[40, 40, -1]], np.int8), np.array([[10, 70, 50]], np.int8)], "colour"
+    ).tolist() == [[10, 70, 50]]
+
+
+def test_blocks_do_not_change_the_result(monkeypatch: pytest.MonkeyPatch) -> None:
+    layers = list(np.random.default_rng(1).integers(-1, 101, (3, 20, 7)).astype(np.int8))
+    whole = {name: fuse(layers, name) for name in FUSIONS}
+    monkeypatch.setattr("mapmeld.merging.fusion._BLOCK_CELLS", 15)
+    for name in FUSIONS:
+        np.testing.assert_array_equal(fuse(layers, name), whole[name])
+
+
 def test_log_odds_add_up() -> None:
     agree = fuse([np.array([[70]], np.int8)] * 2, "log-odds")
     odds = (0.7 / 0.3) ** 2

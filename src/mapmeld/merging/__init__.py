@@ -1,8 +1,8 @@
 """Merging: aligned grids into one, and many maps into components that belong together."""
 
-from mapmeld.merging.aligned import merge_aligned
-from mapmeld.merging.fusion import FUSIONS, UnknownFusionError, fuse
-from mapmeld.merging.merge import Joint, MergeError, MergeResult, merge
+from mapmeld.merging.aligned import MergeError, lattice_for_all, merge_aligned
+from mapmeld.merging.fusion import FUSIONS, UnknownFusionError, check_fusion, fuse
+from mapmeld.merging.merge import Joint, MergeResult, merge
 
 __all__ = [
     "FUSIONS",
@@ -10,7 +10,9 @@ __all__ = [
     "MergeError",
     "MergeResult",
     "UnknownFusionError",
+    "check_fusion",
     "fuse",
+    "lattice_for_all",
     "merge",
     "merge_aligned",
 ]

@@ -8,9 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from mapmeld.errors import MapmeldError
 from mapmeld.grid import OccupancyGrid, resample
 from mapmeld.merging.fusion import fuse
 from mapmeld.se2 import Pose2
+
+MAX_CELLS = 400_000_000
+"""Largest merged map: 20,000 x 20,000 cells, what can be written as a file."""
+
+
+class MergeError(MapmeldError):
+    """The maps cannot be merged as asked."""
 
 
 def merge_aligned(
@@ -31,12 +39,19 @@ def merge_aligned(
     fusion
         A rule of `mapmeld.merging.fusion.FUSIONS`. "newest" goes by the stamps of the maps
         if all have one, otherwise by their order.
+
+    Raises
+    ------
+    MergeError
+        The maps lie so far apart that the merged map would have more than `MAX_CELLS` cells.
+    UnknownFusionError
+        There is no such rule.
     """
     if len(grids) != len(poses) or not grids:
         raise ValueError("as many poses as maps are needed, and at least one")
     if poses[0] != Pose2():
         raise ValueError("the first map is the reference: its pose must be the identity")
-    canvas = _lattice_for_all(grids, poses)
+    canvas = lattice_for_all(grids, poses)
     layers = [canvas.cells, *(resample(g, T, canvas) for g, T in zip(grids[1:], poses[1:], strict=True))]
     stamps = [g.stamp for g in grids]
     known_stamps = [s for s in stamps if s is not None]
@@ -45,8 +60,11 @@ def merge_aligned(
     return replace(canvas, cells=fuse(layers, fusion), stamp=max(known_stamps, default=None))
 
 
-def _lattice_for_all(grids: Sequence[OccupancyGrid], poses: Sequence[Pose2]) -> OccupancyGrid:
-    """Return the first map extended by whole unknown cells to reach over all maps."""
+def lattice_for_all(grids: Sequence[OccupancyGrid], poses: Sequence[Pose2]) -> OccupancyGrid:
+    """Return the first map extended by whole unknown cells to reach over all maps.
+
+    Parameters and errors are those of `merge_aligned`.
+    """
     first = grids[0]
     rows, cols = first.shape
     low, high = np.zeros(2), np.array([cols, rows], dtype=np.float64)
@@ -60,6 +78,12 @@ def _lattice_for_all(grids: Sequence[OccupancyGrid], poses: Sequence[Pose2]) -> 
         # A hair's breadth over a cell edge, by rounding, is no reason for another row of cells.
         low = np.minimum(low, np.floor(reached.min(axis=0) + 1e-6))
         high = np.maximum(high, np.ceil(reached.max(axis=0) - 1e-6))
+    width, height = high - low
+    if not width * height <= MAX_CELLS:
+        raise MergeError(
+            f"the merged map would have {width:.0f} x {height:.0f} cells, more than {MAX_CELLS:,}; "
+            "check the poses and resolutions of the maps"
+        )
     return first.extended(
         left=-math.floor(low[0]),
         bottom=-math.floor(low[1]),

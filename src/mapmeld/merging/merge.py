@@ -3,32 +3,27 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mapmeld.errors import MapmeldError
 from mapmeld.grid import OccupancyGrid
 from mapmeld.io import load, save
 from mapmeld.matching import MatchResult, Verdict, match
-from mapmeld.merging.aligned import merge_aligned
-from mapmeld.merging.fusion import fuse
+from mapmeld.merging.aligned import MergeError, merge_aligned
+from mapmeld.merging.fusion import check_fusion
 from mapmeld.se2 import Pose2
-
-
-class MergeError(MapmeldError):
-    """The maps cannot be merged as asked."""
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """One accepted match that holds the merged map together.
+    """One accepted match that holds a merged map together.
 
     Attributes
     ----------
     reference
-        Indices of the maps that had been merged when the match was made; its frame is the
-        first one's.
+        Indices of the maps on which the match was made: all that had been merged by then, or
+        one of them; the frame is that of the first of these indices.
     index
         The map that was joined to them.
     result
@@ -58,9 +53,10 @@ class MergeResult:
         Which maps belong together, as indices; the first component holds map 0. Maps that
         fit nowhere are components of their own, never dropped and never drawn at identity.
     joints
-        The accepted matches, in the order in which maps were joined.
+        The accepted matches of all components, in the order in which maps were joined.
     refused
-        The last refused match of every map that was not joined to map 0, by index.
+        For every map that was not joined to map 0, by index: the last match of it with all
+        that was merged around map 0.
     """
 
     grid: OccupancyGrid
@@ -105,8 +101,9 @@ def merge(
 ) -> MergeResult:
     """Match maps and merge those that fit, two by two as in the paper (section 4).
 
-    The merged result so far is matched to each remaining map, and so on until none fits any
-    more; what is left starts a component of its own.
+    Each remaining map is matched with the merged result so far and, should it not fit there, with
+    each of the maps in it (a crowded merged map can hide a fit); and so on until none fits
+    any more. What is left starts a component of its own.
 
     Parameters
     ----------
@@ -123,68 +120,91 @@ def merge(
     Raises
     ------
     MergeError
-        Fewer than one map, or `starts` of another length.
+        Fewer than one map, `starts` of another length, or a merged map beyond all size.
     MapFileError
         A map could not be read.
     UnknownMethodError, UnknownFusionError
         No such method or rule.
     """
+    if isinstance(maps, str | os.PathLike):
+        raise MergeError(f"{os.fspath(maps)!r} is one map; give a list of maps")
     if not maps:
         raise MergeError("there is no map to merge")
     if starts is not None and len(starts) != len(maps):
         raise MergeError(f"{len(maps)} maps need {len(maps)} start poses, not {len(starts)}")
+    check_fusion(fusion)  # before the long work
     grids = [m if isinstance(m, OccupancyGrid) else load(m) for m in maps]
-    fuse([grids[0].cells], fusion)  # an unknown rule is reported before the long work
-    first = _grow_component(0, list(range(1, len(grids))), grids, method, parameters, fusion)
-    components = [tuple(first.poses)]
-    waiting = list(first.refused)
-    while waiting:
-        other = _grow_component(waiting[0], waiting[1:], grids, method, parameters, fusion)
-        components.append(tuple(other.poses))
-        waiting = list(other.refused)
-    poses = tuple(first.poses.get(i) for i in range(len(grids)))
+    first, *others = _components(grids, method, parameters)
+    poses = [first.poses.get(i) for i in range(len(grids))]
+    joined = sorted(first.poses)
     start_poses = starts if starts is not None else [Pose2()] * len(grids)
     return MergeResult(
-        grid=first.grid,
-        poses=poses,
+        grid=merge_aligned([grids[i] for i in joined], [first.poses[i] for i in joined], fusion),
+        poses=tuple(poses),
         starts=tuple(None if T is None else T @ start for T, start in zip(poses, start_poses, strict=True)),
-        components=tuple(components),
-        joints=first.joints,
+        components=tuple(tuple(sorted(c.poses)) for c in (first, *others)),
+        joints=tuple(joint for c in (first, *others) for joint in c.joints),
         refused=first.refused,
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Component:
-    grid: OccupancyGrid
     poses: dict[int, Pose2]
     joints: tuple[Joint, ...]
     refused: dict[int, MatchResult]
 
 
+def _components(
+    grids: Sequence[OccupancyGrid], method: str, parameters: object | None
+) -> Iterator[_Component]:
+    """Grow a component from the first map, then from the first of those left, and so on."""
+    waiting = list(range(len(grids)))
+    while waiting:
+        component = _grow_component(waiting[0], waiting[1:], grids, method, parameters)
+        yield component
+        waiting = sorted(component.refused)
+
+
 def _grow_component(
-    seed: int,
-    waiting: list[int],
-    grids: Sequence[OccupancyGrid],
-    method: str,
-    parameters: object | None,
-    fusion: str,
+    seed: int, waiting: list[int], grids: Sequence[OccupancyGrid], method: str, parameters: object | None
 ) -> _Component:
-    """Join to map `seed`, one by one, every waiting map that fits on what has been merged so far."""
+    """Join to map `seed`, one by one, every waiting map that fits on what has been joined so far."""
+    # The paper's own rule is what is matched on, whichever rule the result will be fused by.
     merged = grids[seed]
     poses = {seed: Pose2()}
     joints: list[Joint] = []
     refused: dict[int, MatchResult] = {}
     while waiting:
         index, *waiting = waiting
-        result = match(merged, grids[index], method, parameters)
-        if result.verdict is not Verdict.ACCEPTED or result.T_a_b is None:
-            refused[index] = result
+        on_all = Joint(tuple(poses), index, match(merged, grids[index], method, parameters))
+        joint = next(filter(_accepted, _attempts(on_all, poses, grids, method, parameters)), None)
+        if joint is None or joint.result.T_a_b is None:
+            refused[index] = on_all.result
             continue
-        joints.append(Joint(tuple(poses), index, result))
-        poses[index] = result.T_a_b
-        merged = merge_aligned([grids[i] for i in poses], list(poses.values()), fusion)
+        joints.append(joint)
+        poses[index] = poses[joint.reference[0]] @ joint.result.T_a_b
+        merged = merge_aligned([grids[i] for i in poses], list(poses.values()))
         # What did not fit on less of the place may fit on more of it.
         waiting += refused
         refused = {}
-    return _Component(merged, poses, tuple(joints), refused)
+    return _Component(poses, tuple(joints), refused)
+
+
+def _attempts(
+    on_all: Joint,
+    poses: Iterable[int],
+    grids: Sequence[OccupancyGrid],
+    method: str,
+    parameters: object | None,
+) -> Iterator[Joint]:
+    """Give the match with the merged map and then, as long as more are wanted, with each map in it."""
+    yield on_all
+    if len(on_all.reference) > 1:
+        for member in poses:
+            result = match(grids[member], grids[on_all.index], method, parameters)
+            yield Joint((member,), on_all.index, result)
+
+
+def _accepted(joint: Joint) -> bool:
+    return joint.result.verdict is Verdict.ACCEPTED

@@ -19,6 +19,7 @@ from mapmeld.matching.alphabet.fitting import Fitting, best_matching_points
 from mapmeld.matching.alphabet.letters import Alphabet, generate_alphabet, greatest_distance
 from mapmeld.matching.alphabet.parameters import AlphabetParameters
 from mapmeld.matching.alphabet.preprocessing import Image, preprocess
+from mapmeld.matching.modes import distinct_modes
 from mapmeld.matching.result import Alternative, MatchResult, Verdict
 from mapmeld.se2 import Pose2
 
@@ -96,7 +97,9 @@ def match_alphabet(
         ),
         similarity=best.similarity,
         overlap=overlap_share(a, b, T_a_b),
-        alternatives=tuple(Alternative(in_metres(f.T_1_2_px, *matching.maps), f.similarity) for f in others),
+        alternatives=distinct_modes(
+            T_a_b, (Alternative(in_metres(f.T_1_2_px, *matching.maps), f.similarity) for f in others), b
+        ),
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmeld.matching.alphabet.letters import Alphabet
+from mapmeld.matching.alphabet.letters import ROUNDING, Alphabet
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ def select_candidates(
         if len(candidates) == number or gamma[i, z] == 0:
             break
         # Not-a-number (no relation) compares false.
-        similar = np.abs(distance_1[i][:, None] - distance_2[z][None, :]) <= distance_tolerance_px
+        similar = np.abs(distance_1[i][:, None] - distance_2[z][None, :]) <= distance_tolerance_px + ROUNDING
         votes = np.where(similar, gamma, 0)
         j, k = (int(n) for n in divmod(int(votes.argmax()), gamma.shape[1]))
         if votes[j, k] > 0:

@@ -18,14 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from mapmeld.matching.alphabet.letters import Alphabet
+from mapmeld.matching.alphabet.letters import ROUNDING, Alphabet
 
 _TURN = 2 * np.pi
 # Correspondences handled at a time: what fits into the cache is sorted fastest, and memory is bounded.
 _CHUNK = 1 << 17
-# Distances and angles are compared with this slack, so that values equal to the tolerance on
-# paper are equal after rounding too, whatever frame they were computed in.
-_ROUNDING = 1e-9
 
 
 def compare_alphabets(
@@ -40,7 +37,7 @@ def compare_alphabets(
     angle_tolerance
         nu [rad], less than pi / 2.
     """
-    epsilon, nu = distance_tolerance_px + _ROUNDING, angle_tolerance + _ROUNDING
+    epsilon, nu = distance_tolerance_px + ROUNDING, angle_tolerance + ROUNDING
     n1, n2 = len(first.corners_px), len(second.corners_px)
     gamma = np.zeros(n1 * n2, np.int64)
     by_distance = np.argsort(second.distance_px, kind="stable")
@@ -94,11 +91,18 @@ def _count_equal_rotations(
     key = pair * stretch + rotation + 1.0
     # The circle closes: what lies within nu past zero is also a turn further on.
     across = np.sort(key[rotation <= nu]) + _TURN
+    late = key[rotation >= _TURN - nu]
+    partners = np.searchsorted(across, late + nu, side="right") - np.searchsorted(across, late)
+    counts = np.bincount((late // stretch).astype(np.intp), partners, pairs).astype(np.int64)
     key.sort()
-    partners = np.searchsorted(key, key + nu, side="right") - np.arange(1, len(key) + 1)
-    partners += np.searchsorted(across, key + nu, side="right") - np.searchsorted(across, key)
-    owner = (key // stretch).astype(np.intp)
-    return np.bincount(owner, weights=partners, minlength=pairs).astype(np.int64)
+    ahead = 1
+    first = np.flatnonzero(key[1:] - key[:-1] <= nu)
+    while len(first):
+        counts += np.bincount((key[first] // stretch).astype(np.intp), minlength=pairs)
+        ahead += 1
+        first = first[first < len(key) - ahead]
+        first = first[key[first + ahead] - key[first] <= nu]
+    return counts
 
 
 def _count_relations_used_twice(one: Alphabet, two: Alphabet, epsilon: float, nu: float) -> NDArray[np.int64]:

@@ -52,8 +52,8 @@ def black_pixels(image: Image) -> Points:
 def jaccard_similarity(image_1: Image, black_2_px: Points, T_1_2_px: Pose2) -> float:
     """Return the black pixels that both maps share / the black pixels of either (Jaccard 1912).
 
-    Each black pixel of map 2 is carried to the pixel of map 1 in which its centre falls: what a
-    nearest-neighbour rotation of the whole image counts, at the cost of the walls only.
+    Each black pixel of map 2 is carried to the pixel of map 1 in which its centre falls. This counts
+    what a rotation of the whole image would, to about 0.01, at the cost of the walls only.
     Pixels that fall outside map 1 belong to the union.
     """
     x, y = black_2_px.T

@@ -13,6 +13,10 @@ from numpy.typing import NDArray
 
 from mapmeld.matching.alphabet.corners import Points
 
+ROUNDING = 1e-9
+"""Distances [px] and angles [rad] are compared with this slack, so that values that equal a bound on
+paper still do after rounding, whatever frame they were computed in."""
+
 
 @dataclass(frozen=True, slots=True)
 class Alphabet:
@@ -68,7 +72,7 @@ def generate_alphabet(corners_px: Points, relation_min_px: float, relation_max_p
         D_min and D_max [px]; D_max < D_min leaves letters without relations.
     """
     distance = _distances(corners_px)
-    related = (distance >= relation_min_px) & (distance <= relation_max_px)
+    related = (distance >= relation_min_px - ROUNDING) & (distance <= relation_max_px + ROUNDING)
     np.fill_diagonal(related, False)
     letter, other = np.nonzero(related)
     step = corners_px[other] - corners_px[letter]

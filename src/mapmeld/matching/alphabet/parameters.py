@@ -52,6 +52,9 @@ class AlphabetParameters:
             value = getattr(self, setting.name)
             if not math.isfinite(value):
                 raise ValueError(f"{setting.name} must be a finite number, not {value}")
+        for name in ("corners", "candidates", "median_px"):
+            if not isinstance(getattr(self, name), int):
+                raise ValueError(f"{name} must be a whole number, not {getattr(self, name)}")
         for name, low, high in (
             ("corners", 2, 10_000),
             ("corner_spacing_px", 0, math.inf),

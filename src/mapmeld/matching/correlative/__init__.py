@@ -1,0 +1,1 @@
+"""The default matcher: correlation of walls and floor, alignment, and a calibrated probability."""

@@ -183,7 +183,7 @@ class _Raster:
 
     @classmethod
     def reduced(cls, image: Image, m: ReducedMap, wanted: float) -> _Raster:
-        """Average a raster down by a whole number, so that sampling it `wanted` metres apart skips nothing."""
+        """Average a raster down by a whole number: sampling it `wanted` metres apart then skips nothing."""
         k = max(1, int(wanted / m.cell + 0.2))
         return cls(pooled(image, k), m.cell * k, (m.middle[0] / k - 0.5, m.middle[1] / k - 0.5))
 
