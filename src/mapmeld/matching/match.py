@@ -20,6 +20,7 @@ from mapmeld.matching.baselines import (
     match_fourier_mellin,
     match_hough_spectrum,
 )
+from mapmeld.matching.correlative import CorrelativeParameters, match_correlative
 from mapmeld.matching.result import MatchResult
 
 
@@ -37,6 +38,11 @@ class Method:
 
 
 METHODS: Mapping[str, Method] = {
+    "correlative": Method(
+        match_correlative,
+        CorrelativeParameters,
+        "walls and floor correlated, aligned and weighed (the default)",
+    ),
     "alphabet": Method(match_alphabet, AlphabetParameters, "the paper's alphabet of corner relations"),
     "feature_orb": Method(match_feature_orb, FeatureOrbParameters, "ORB features, as multirobot_map_merge"),
     "feature_akaze": Method(

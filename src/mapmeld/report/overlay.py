@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from mapmeld.grid import Cells, OccupancyGrid, resample
-from mapmeld.merging import lattice_for_all
+from mapmeld.merging import merge_aligned
 from mapmeld.report.canvas import Labels, Picture, known_window, paint
 from mapmeld.report.palette import FLOOR_WHITE, GREEN, OVERLAY_COLOURS, UNKNOWN_GREY, Colour
 from mapmeld.report.sheet import Panel, compose
@@ -62,7 +62,7 @@ def overlay(
     Picture: map 1 red, map 2 blue, walls that two or more maps share (within one cell) green,
     floor white, unknown grey.
     """
-    lattice = lattice_for_all(grids, poses)
+    lattice = merge_aligned(grids, poses)
     layers = [resample(grid, T, lattice) for grid, T in zip(grids, poses, strict=True)]
     colours: list[Colour] = [OVERLAY_COLOURS[i % len(OVERLAY_COLOURS)] for i in range(len(grids))]
     canvas = paint(

@@ -1,0 +1,182 @@
+"""Evidence: how two maps explain each other under one transform."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapmeld.matching.correlative.alignment import WallPairs, look_up, turn_and_shift
+from mapmeld.matching.correlative.bending import nearest_rigid, patch_shifts, patches_of, smooth_bending
+from mapmeld.matching.correlative.covariance import transform_covariance
+from mapmeld.matching.correlative.wall_map import Doubles, Floats, Plane, WallMap
+
+HIT = 0.1  # [m] across the wall: explained by the other map's wall
+NEAR = 0.3  # [m] next to the other map's wall
+DEEP = 0.3  # [m] further than this from anything inside free space: there is no wall here
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """How well two maps explain each other under one transform; lengths in metres of wall of both maps.
+
+    Attributes
+    ----------
+    wall
+        Wall that lies where the other map knows something.
+    hit, hit_bent
+        Of it, explained: within HIT of the other's wall and of the same direction; as it lies, and
+        after b is bent smoothly and patch by patch onto a.
+    contra, contra_bent
+        Deep in the other's free space, where no wall can be; rigidly, and bent.
+    chance, chance_deep
+        Share of the common floor within HIT of a wall / deeper than DEEP: what walls placed at
+        random would get.
+    bend
+        Rms displacement by the bending [m].
+    overlap_area, overlap
+        Area known in both [m^2], and its share of the smaller map.
+    weak
+        Explained wall that fixes the least fixed direction [m]; small along corridors.
+    middle
+        Middle of what is explained, in a's local frame.
+    covariance
+        3 x 3, of (x, y, theta) of the transform between the metric frames [m, m, rad].
+    unbent
+        The rigid transform (local frames, (3,)) nearest to the bent one.
+    """
+
+    wall: float
+    hit: float
+    hit_bent: float
+    contra: float
+    contra_bent: float
+    chance: float
+    chance_deep: float
+    bend: float
+    overlap_area: float
+    overlap: float
+    weak: float
+    middle: complex
+    covariance: Doubles
+    unbent: Doubles
+
+    @property
+    def surplus(self) -> float:
+        """Root of the deviance [nats x metres] of (hit, contradicted, neither) from a random placement.
+
+        Grows with the length of wall that was tested and with its distance from chance.
+        """
+        hit, deep = self.hit_bent / self.wall, self.contra_bent / self.wall
+        hit_by_chance = min(max(self.chance, 0.02), 0.8)
+        deep_by_chance = min(max(self.chance_deep, 0.02), 0.9)
+        if hit <= hit_by_chance:
+            return 0.0
+        nats = 0.0
+        for seen, expected in (
+            (min(max(hit, 1e-3), 0.999), hit_by_chance),
+            (min(max(deep, 1e-3), 0.9), deep_by_chance),
+            (max(1 - hit - deep, 1e-3), max(1 - hit_by_chance - deep_by_chance, 0.05)),
+        ):
+            nats += seen * math.log(seen / expected)
+        return math.sqrt(max(0.0, nats * self.wall))
+
+    @property
+    def clean(self) -> float:
+        """How little wall lies in the other's free space, as a logarithm: 0 (all of it) .. 3.9 (none)."""
+        return -math.log(self.contra / self.wall + 0.02)
+
+    @property
+    def log_overlap(self) -> float:
+        """Small overlaps of large maps come about by chance in many more ways than large ones."""
+        return math.log(self.overlap + 0.02)
+
+    @property
+    def clean_bent(self) -> float:
+        """The same after bending."""
+        return -math.log(self.contra_bent / self.wall + 0.02)
+
+
+def evidence(pa: WallMap, pb: WallMap, t: Doubles, n: int = 1200) -> Evidence:
+    """Measure how both maps explain each other under t (3,), which takes b's local frame into a's."""
+    metres = _metres(pa, pb, n)
+    rigid = look_up(pa, pb, t[None], n)
+    x = rigid.x[0]
+    u = smooth_bending(pa, pb, t, x)
+    smooth = look_up(pa, pb, t[None], n, u)
+    patch, patches = patches_of(x)
+    u = u + patch_shifts(smooth, patch, patches)[patch]
+    bent = look_up(pa, pb, t[None], n, u)
+
+    near = np.minimum(np.abs(rigid.e), np.abs(bent.e))[0] < NEAR
+    inside = near | (rigid.depth[0] >= 0) | (bent.depth[0] >= 0)
+    hit = _hits(bent)
+    explained = metres * hit
+    total = float(explained.sum()) + 1e-6
+    bend = math.sqrt(float(explained @ (u.real**2 + u.imag**2)) / total)
+    line = explained * (bent.straight[0] > 0.3)
+    nx, ny = bent.normal[0].real, bent.normal[0].imag
+    xx, xy, yy = float(line @ (nx * nx)), float(line @ (nx * ny)), float(line @ (ny * ny))
+
+    turn, shift = turn_and_shift(t[None])
+    on_a, on_b = (
+        pa.depth[pa.at(turn[0] * pb.floor + shift[0])],
+        pb.depth[pb.at((pa.floor - shift[0]) * turn[0].conj())],
+    )
+    area = 0.5 * (float((on_a >= 0).mean()) * pb.area + float((on_b >= 0).mean()) * pa.area)
+    close, deep = _by_chance(pa, pb, turn[0], shift[0])
+    return Evidence(
+        wall=float(metres @ inside) + 1e-6,
+        hit=float(metres @ (_hits(rigid) & inside)),
+        hit_bent=total,
+        contra=float(metres @ (rigid.depth[0] > DEEP)),
+        contra_bent=float(metres @ (np.minimum(rigid.depth, bent.depth)[0] > DEEP)),
+        chance=close,
+        chance_deep=deep,
+        bend=bend,
+        overlap_area=area,
+        overlap=area / min(pa.area, pb.area),
+        weak=max(0.0, (xx + yy) / 2 - math.hypot((xx - yy) / 2, xy)),
+        middle=complex(explained @ x) / total,
+        covariance=transform_covariance(pa, pb, t, rigid, patch, patches, bend),
+        unbent=nearest_rigid(t, x, u, explained),
+    )
+
+
+def _by_chance(pa: WallMap, pb: WallMap, turn: Plane, shift: Plane) -> tuple[float, float]:
+    """Shares of the common floor within HIT of the other map's wall, and deep in its free space."""
+    close = deep = both = 0
+    for p, z in ((pa, turn * pb.floor + shift), (pb, (pa.floor - shift) * turn.conj())):
+        i = p.at(z)
+        depth = p.depth[i]
+        known = depth >= 0
+        both += int(np.count_nonzero(known))
+        close += int(np.count_nonzero(known & (np.abs(z - p.points[p.nearest[i]]) < HIT)))
+        deep += int(np.count_nonzero(depth > DEEP))
+    return (close / both, deep / both) if both else (1.0, 0.0)
+
+
+def _hits(p: WallPairs) -> NDArray[np.bool_]:
+    r, along = p.across()
+    same_way = (p.cosine() > 0.85) | (p.straight < 0.3)
+    return np.asarray(((np.abs(r) < HIT) & (np.abs(along) < 0.2) & same_way)[0])
+
+
+def quick_scores(pa: WallMap, pb: WallMap, t: Doubles, n: int) -> Floats:
+    """Score roughly refined t (k, 3) cheaply: walls explained beyond chance, less walls contradicted."""
+    p = look_up(pa, pb, t, n)
+    metres = _metres(pa, pb, n)
+    distance = np.abs(p.e)
+    explained = np.exp(-0.5 * (distance / np.float32(0.2)) ** 2) @ metres
+    tested = ((p.depth >= 0) | (distance < NEAR)) @ metres
+    against = (p.depth > DEEP) @ metres
+    return np.asarray((explained - 0.35 * tested - 0.5 * against) / np.sqrt(tested + 10))
+
+
+def _metres(pa: WallMap, pb: WallMap, n: int) -> Floats:
+    """Length of wall [m] that each of the first n points of b, then of a, stands for."""
+    return np.concatenate(
+        [np.full(min(n, len(p.points)), p.metres * max(1.0, len(p.points) / n), np.float32) for p in (pb, pa)]
+    )

@@ -1,0 +1,203 @@
+"""The default matcher on one page: search coarsely, align finely, weigh the evidence, say how sure.
+
+Both maps play the same part: the answer for (b, a) is the inverse of that for (a, b).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mapmeld.grid import OccupancyGrid
+from mapmeld.matching.correlative.alignment import refine, to_local, to_metric, turn_and_shift
+from mapmeld.matching.correlative.covariance import of_inverse
+from mapmeld.matching.correlative.evidence import HIT, Evidence, evidence, quick_scores
+from mapmeld.matching.correlative.parameters import CorrelativeParameters
+from mapmeld.matching.correlative.probability import ProbabilityModel, fitted_model
+from mapmeld.matching.correlative.reduced_map import reduce_map
+from mapmeld.matching.correlative.search import search
+from mapmeld.matching.correlative.wall_map import Doubles, WallMap, wall_map
+from mapmeld.matching.result import Alternative, MatchResult, Verdict
+from mapmeld.se2 import wrap_angle
+
+COARSE_SCALES, COARSE_POINTS = (0.8, 0.6, 0.5, 0.4), 160
+FINE_SCALES, FINE_POINTS = (0.3, 0.25, 0.2, 0.15, 0.15), 600
+LOOKED_AT = 4  # transforms for which the full evidence is measured
+UNBENT_KEEPS = 0.8  # share of the walls explained as they lie that a transform found by bending must keep
+APART = 0.5  # [m] modes nearer than this (or than the maps bend) are one
+APART_TURNED = 0.09  # [rad]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mode:
+    """One way to lay map 2 on map 1.
+
+    Attributes
+    ----------
+    local
+        (x, y, theta) between the local frames of the two wall maps.
+    evidence
+        What speaks for it.
+    score
+        Of the probability model.
+    """
+
+    local: Doubles
+    evidence: Evidence
+    score: float
+
+
+def match_correlative(
+    a: OccupancyGrid, b: OccupancyGrid, parameters: CorrelativeParameters | None = None
+) -> MatchResult:
+    """Match two maps by correlation of walls and floor, alignment of walls, and evidence.
+
+    `probability` is calibrated, see docs/methods.md; the verdict is ``ambiguous`` where several modes
+    together, but none alone, are sure enough.
+    """
+    parameters = parameters or CorrelativeParameters()
+    walls_a, walls_b = wall_map(a), wall_map(b)
+    if walls_a is None or walls_b is None:
+        return _rejected(f"nothing to match on: map {'a' if walls_a is None else 'b'} has no obstacle")
+    if _comes_first(b, walls_b, a, walls_a):
+        return _inverted(_match(b, walls_b, a, walls_a, parameters))
+    return _match(a, walls_a, b, walls_b, parameters)
+
+
+def _match(
+    a: OccupancyGrid, walls_a: WallMap, b: OccupancyGrid, walls_b: WallMap, parameters: CorrelativeParameters
+) -> MatchResult:
+    model = fitted_model()
+    hypotheses = search(reduce_map(a), reduce_map(b), parameters.hypotheses)
+    if not hypotheses:
+        return _rejected("nothing to match on: the walls fit nowhere")
+    transforms = np.array([to_local(walls_a, walls_b, h.T_a_b) for h in hypotheses])
+    transforms = refine(walls_a, walls_b, transforms, COARSE_SCALES, COARSE_POINTS)
+    transforms = transforms[_most_promising(walls_a, walls_b, transforms)]
+    transforms = refine(walls_a, walls_b, transforms, FINE_SCALES, FINE_POINTS)
+    modes = _distinct(walls_b, _weighed(walls_a, walls_b, transforms, model))
+    probabilities = model.probabilities([mode.score for mode in modes])
+    return _answer(walls_a, walls_b, modes, probabilities, parameters.accept_probability)
+
+
+def _most_promising(walls_a: WallMap, walls_b: WallMap, transforms: Doubles) -> list[int]:
+    """Return the rows worth a full look, none of them a repetition of a better one."""
+    quick = quick_scores(walls_a, walls_b, transforms, 2 * COARSE_POINTS)
+    quick[0] = np.inf  # the search's own favourite always gets its full look
+    kept: list[int] = []
+    for k in np.argsort(-quick, kind="stable"):
+        if all(_differ(walls_b, transforms[k], transforms[j], 0.4, 0.05) for j in kept):
+            kept.append(int(k))
+    return kept[:LOOKED_AT]
+
+
+def _weighed(walls_a: WallMap, walls_b: WallMap, transforms: Doubles, model: ProbabilityModel) -> list[Mode]:
+    """Measure the evidence for each transform (k, 3); the best comes first."""
+
+    def weigh(local: Doubles) -> Mode:
+        found = evidence(walls_a, walls_b, local)
+        return Mode(local, found, model.score(found))
+
+    modes = sorted(map(weigh, transforms), key=lambda mode: -mode.score)
+    best = modes[0]
+    if best.evidence.bend > HIT:
+        # Narrow tolerances can lock onto one part of a bent map; the bending has seen all of it.
+        again = weigh(best.evidence.unbent)
+        # Not at the price of walls that fitted as they lay: those are more exact than any bending.
+        if again.score > best.score and again.evidence.hit >= UNBENT_KEEPS * best.evidence.hit:
+            modes[0] = again
+    return modes
+
+
+def _distinct(walls_b: WallMap, modes: Sequence[Mode]) -> list[Mode]:
+    """Return modes that truly differ, best first; of those that do not, the one that fits best unbent."""
+    groups: list[list[Mode]] = []
+    for mode in modes:
+        for group in groups:
+            reach = max(APART, 1.5 * group[0].evidence.bend)
+            if not _differ(walls_b, mode.local, group[0].local, reach, APART_TURNED):
+                group.append(mode)
+                break
+        else:
+            groups.append([mode])
+    return [max(group, key=lambda mode: mode.evidence.hit) for group in groups]
+
+
+def _differ(walls_b: WallMap, s: Doubles, t: Doubles, metres: float, radians: float) -> bool:
+    """Whether two transforms turn b differently or put its middle at different places."""
+    if abs(wrap_angle(float(s[2] - t[2]))) > radians:
+        return True
+    turn, shift = turn_and_shift(np.stack([s, t]))
+    middle = turn[:, 0] * walls_b.points[:200].mean() + shift[:, 0]
+    return bool(abs(middle[0] - middle[1]) > metres)
+
+
+# ---------------------------------------------------------------------- the answer
+def _answer(
+    walls_a: WallMap, walls_b: WallMap, modes: Sequence[Mode], probabilities: Doubles, accept: float
+) -> MatchResult:
+    best = modes[0].evidence
+    reason = (
+        f"of {best.wall:.0f} m of wall in the overlap the other map explains "
+        f"{100 * best.hit_bent / best.wall:.0f} % and contradicts {100 * best.contra / best.wall:.1f} %"
+    )
+    if probabilities[0] >= accept:
+        verdict = Verdict.ACCEPTED
+    elif len(modes) > 1 and probabilities[:2].sum() >= accept:
+        verdict = Verdict.AMBIGUOUS
+        reason += "; another transform explains the maps about as well"
+    else:
+        verdict = Verdict.REJECTED
+        reason += ": not enough to be sure"
+    return MatchResult(
+        T_a_b=to_metric(walls_a, walls_b, modes[0].local),
+        verdict=verdict,
+        reason=reason,
+        probability=float(probabilities[0]),
+        similarity=_similarity(walls_a, walls_b, best),
+        overlap=min(1.0, best.overlap),
+        covariance=best.covariance,
+        alternatives=tuple(
+            Alternative(
+                to_metric(walls_a, walls_b, mode.local),
+                _similarity(walls_a, walls_b, mode.evidence),
+                float(probability),
+            )
+            for mode, probability in zip(modes[1:], probabilities[1:], strict=True)
+        ),
+    )
+
+
+def _similarity(walls_a: WallMap, walls_b: WallMap, found: Evidence) -> float:
+    """Jaccard similarity of the walls by their length: explained within `HIT` / of either map."""
+    total = sum(w.metres * len(w.points) for w in (walls_a, walls_b))
+    shared = min(found.hit / 2, total / 2)
+    return shared / (total - shared)
+
+
+def _rejected(reason: str) -> MatchResult:
+    return MatchResult(T_a_b=None, verdict=Verdict.REJECTED, reason=reason, probability=0.0)
+
+
+# ---------------------------------------------------------------------- both maps play the same part
+def _comes_first(b: OccupancyGrid, walls_b: WallMap, a: OccupancyGrid, walls_a: WallMap) -> bool:
+    """Whether b is the one to lay the other on: the larger map, or any order that swapping respects."""
+    key_a, key_b = ((w.area, len(w.points), w.shape) for w in (walls_a, walls_b))
+    if key_a == key_b:
+        return b.cells.tobytes() > a.cells.tobytes()
+    return key_b > key_a
+
+
+def _inverted(result: MatchResult) -> MatchResult:
+    """Return the answer for (b, a) as that for (a, b)."""
+    T_b_a = result.T_a_b
+    if T_b_a is None:
+        return result
+    return replace(
+        result,
+        T_a_b=T_b_a.inverse(),
+        covariance=None if result.covariance is None else of_inverse(T_b_a, result.covariance),
+        alternatives=tuple(replace(other, T_a_b=other.T_a_b.inverse()) for other in result.alternatives),
+    )

@@ -1,0 +1,53 @@
+"""The probability that a transform is right: what the paper leaves to future work (section 5)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from mapmeld.matching.correlative.evidence import Evidence
+from mapmeld.matching.correlative.wall_map import Doubles
+
+
+@dataclass(frozen=True, slots=True)
+class ProbabilityModel:
+    """Conditional logit (McFadden 1974) over the modes of a pair of maps and "none of them".
+
+    P(mode i is right) = exp(s_i) / (1 + sum_j exp(s_j)), s = bias + sum of weight x figure, so that
+    modes which explain the maps equally well share the probability among them.
+
+    Attributes
+    ----------
+    bias
+        Of s.
+    weights
+        By the name of a figure of `Evidence`.
+    """
+
+    bias: float
+    weights: Mapping[str, float]
+
+    def score(self, evidence: Evidence) -> float:
+        """Return s of a mode."""
+        return self.bias + sum(w * float(getattr(evidence, name)) for name, w in self.weights.items())
+
+    def probabilities(self, scores: Sequence[float]) -> Doubles:
+        """Return P of each mode; they sum to 1 less P(none of them)."""
+        s = np.array([*scores, 0.0])
+        p = np.exp(s - s.max())
+        return np.asarray(p[:-1] / p.sum())
+
+
+@cache
+def fitted_model() -> ProbabilityModel:
+    """Return the model with the coefficients that mapmeld ships (``probability.json``).
+
+    `benchmarks/fit_probability.py` fits them; docs/methods.md says on which maps.
+    """
+    raw = json.loads(files(__package__).joinpath("probability.json").read_text(encoding="utf-8"))
+    return ProbabilityModel(float(raw["bias"]), {str(k): float(v) for k, v in raw["weights"].items()})

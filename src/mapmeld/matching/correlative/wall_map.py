@@ -1,0 +1,193 @@
+"""A map made ready for comparison: points on its walls, and fields in which other maps' walls look them up.
+
+Everything is measured in metres, in the map's *local frame* (corner at the lower left of its known
+cells, axes along its lattice): far origins cost no precision and unknown borders change nothing.
+Points and vectors of the plane are complex numbers: turning is a product, and ``e * conj(normal)`` is
+the distance across a wall (real part) and along it (imaginary part) at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapmeld.grid import FREE_UP_TO, OCCUPIED, OCCUPIED_FROM, OccupancyGrid
+from mapmeld.se2 import Pose2
+
+Floats = NDArray[np.float32]
+Doubles = NDArray[np.float64]
+Plane = NDArray[np.complex64]
+Index = NDArray[np.intp]
+
+FIELD_CELL = 0.1  # [m] lattice on which the nearest wall is looked up; finer detail is in the wall points
+MAX_FIELD_CELLS = 6_000_000  # larger maps get coarser fields, so that time and memory stay bounded
+BORDER = 2  # unknown cells around a field, where points outside the map land
+FLOOR_SAMPLE = 1000  # known cells that measure the overlap
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WallMap:
+    """A map made ready for many comparisons.
+
+    Attributes
+    ----------
+    frame
+        Pose of the local frame in the map's metric frame.
+    cell
+        Side of a field cell [m].
+    shape
+        (rows, cols) of the fields, border included.
+    depth
+        How deep inside the free space a field cell lies: distance to what is not free [m];
+        0 on walls, -1 where unknown. Flat.
+    nearest
+        Index into `points` of the wall point nearest to a field cell. Flat.
+    points, normals
+        Wall points (n,) [m] on the middle line of the wall and the wall's unit normals, in an order
+        in which the first k are a fair sample, for every k.
+    straight
+        How line-like the wall is at each point (n,), 0 (blob, corner) .. 1.
+    metres
+        Length of wall that one point stands for [m].
+    floor
+        Sample of known places (m,) [m].
+    area
+        Known area [m^2].
+    """
+
+    frame: Pose2
+    cell: float
+    shape: tuple[int, int]
+    depth: Floats
+    nearest: NDArray[np.int32]
+    points: Plane
+    normals: Plane
+    straight: Floats
+    metres: float
+    floor: Plane
+    area: float
+
+    def at(self, z: Plane) -> Index:
+        """Return flat field indices of points of the local frame; outside is the (unknown) border."""
+        rows, cols = self.shape
+        scale, border = np.float32(1 / self.cell), np.float32(BORDER)
+        c = np.minimum(np.maximum(z.real * scale + border, 0), cols - 1).astype(np.intp)
+        r = np.minimum(np.maximum(z.imag * scale + border, 0), rows - 1).astype(np.intp)
+        return np.asarray(r * cols + c)
+
+
+def wall_map(grid: OccupancyGrid) -> WallMap | None:
+    """Compute the fields and wall points of a map; None if it holds no wall."""
+    grid = grid.cropped()
+    cells = np.ascontiguousarray(grid.cells)
+    wall = cv2.inRange(cells, OCCUPIED_FROM, OCCUPIED)
+    free = cv2.inRange(cells, 0, FREE_UP_TO)
+    known = cv2.inRange(cells, 0, OCCUPIED)
+    if not cv2.countNonZero(wall):
+        return None
+    spots = cv2.findNonZero(wall)
+    k = max(1, round(FIELD_CELL / grid.resolution))
+    while wall.size / k**2 > MAX_FIELD_CELLS:
+        k += 1
+    cell = grid.resolution * k
+    shape = (-(-wall.shape[0] // k) + 2 * BORDER, -(-wall.shape[1] // k) + 2 * BORDER)
+    own, points, normals, straight = _wall_points(np.asarray(spots, np.int32).reshape(-1, 2), k, shape)
+    n = len(own)
+
+    walls = np.zeros(shape[0] * shape[1], np.uint8)
+    walls[own] = 255
+    walls = walls.reshape(shape)
+    _, labels = cv2.distanceTransformWithLabels(
+        255 - walls, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    labels = labels.ravel()
+    order = np.random.default_rng(0).permutation(n)
+    place = np.empty(n, np.int32)
+    place[order] = np.arange(n, dtype=np.int32)
+    of_label = np.zeros(n + 1, np.int32)
+    of_label[labels[own]] = place
+
+    is_free = ((_share(free, k, shape) > 127) & (walls == 0)).view(np.uint8)
+    depth = cv2.distanceTransform(is_free, cv2.DIST_L2, cv2.DIST_MASK_5) * np.float32(cell)
+    is_known = (_share(known, k, shape) > 127) | (walls > 0)
+    depth[~is_known] = -1
+    floor = np.flatnonzero(is_known)
+    step = max(1, len(floor) // FLOOR_SAMPLE)
+    floor = floor[step // 2 :: step]
+    floor_row, floor_col = np.divmod(floor, shape[1])
+    return WallMap(
+        frame=grid.origin,
+        cell=cell,
+        shape=shape,
+        depth=depth.ravel(),
+        nearest=of_label[labels],
+        points=(points[order] * cell).astype(np.complex64),
+        normals=normals[order].astype(np.complex64),
+        straight=straight[order].astype(np.float32),
+        metres=cell,
+        floor=((floor_col - BORDER + 0.5 + 1j * (floor_row - BORDER + 0.5)) * cell).astype(np.complex64),
+        area=cv2.countNonZero(known) * grid.resolution**2,
+    )
+
+
+def _wall_points(
+    spots: NDArray[np.int32], k: int, shape: tuple[int, int]
+) -> tuple[Index, NDArray[np.complex128], NDArray[np.complex128], Doubles]:
+    """Return one wall point per field cell that holds wall: (flat field index, place, normal, straightness).
+
+    A point is moved onto the wall's middle line, found from the first and second moments of the wall
+    cells in the 3 x 3 field cells around it. This takes the raggedness of a cell out of the walls.
+    Places are in field cells.
+    """
+    col, row = spots[:, 0], spots[:, 1]
+    width = shape[1]
+    flat = (row // k + BORDER) * width + (col // k + BORDER)
+    holds = np.zeros(shape[0] * width, bool)
+    holds[flat] = True
+    own = np.flatnonzero(holds)
+    n = len(own)
+    place = np.full(shape[0] * width, n, np.int32)
+    place[own] = np.arange(n, dtype=np.int32)
+    x, y = (col % k + 0.5) / k, (row % k + 0.5) / k
+    i = place[flat]
+    # Row n stays empty: it answers for neighbours without wall.
+    m = np.stack([np.bincount(i, v, n + 1) for v in (None, x, y, x * x, x * y, y * y)], axis=1)
+    s = np.zeros((n, 6))
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            a = m[place[own + (dy * width + dx)]]
+            s += a  # then from the neighbour's corner to one's own
+            if dx:
+                s[:, 1] += dx * a[:, 0]
+                s[:, 3] += 2 * dx * a[:, 1] + a[:, 0]
+                s[:, 4] += dx * a[:, 2]
+            if dy:
+                s[:, 2] += dy * a[:, 0]
+                s[:, 4] += dy * a[:, 1] + dx * dy * a[:, 0]
+                s[:, 5] += 2 * dy * a[:, 2] + a[:, 0]
+    count, mx, my = s[:, 0], s[:, 1] / s[:, 0], s[:, 2] / s[:, 0]
+    xx, xy, yy = s[:, 3] / count - mx * mx, s[:, 4] / count - mx * my, s[:, 5] / count - my * my
+    half, root = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    along = np.exp(0.5j * np.arctan2(2 * xy, xx - yy))
+    straight = np.where(count >= 3, np.clip(1 - 3 * (half - root) / np.maximum(half + root, 1e-6), 0, 1), 0)
+    mine = (m[:n, 1] + 1j * m[:n, 2]) / m[:n, 0]
+    middle = mx + 1j * my
+    on_line = middle + along * ((mine - middle) * along.conj()).real
+    row_of, col_of = np.divmod(own, width)
+    corner = (col_of - BORDER) + 1j * (row_of - BORDER)
+    return own, corner + np.where(straight > 0.3, on_line, mine), along * 1j, straight
+
+
+def _share(mask: NDArray[Any], k: int, shape: tuple[int, int]) -> NDArray[Any]:
+    """Return the share of each k x k block where mask holds, 0..255, with the fields' border."""
+    rows, cols = shape[0] - 2 * BORDER, shape[1] - 2 * BORDER
+    if k > 1:
+        mask = cv2.copyMakeBorder(
+            mask, 0, rows * k - mask.shape[0], 0, cols * k - mask.shape[1], cv2.BORDER_CONSTANT, value=0
+        )
+        mask = cv2.resize(mask, (cols, rows), interpolation=cv2.INTER_AREA)
+    return cv2.copyMakeBorder(mask, BORDER, BORDER, BORDER, BORDER, cv2.BORDER_CONSTANT, value=0)
