@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mapmeld.grid import OccupancyGrid, at_resolution, overlap_share, resample
+import mapmeld
+from mapmeld.grid import OccupancyGrid, ResolutionError, at_resolution, overlap_share, resample
 from mapmeld.se2 import Pose2
 
 poses = st.from_type(Pose2)
@@ -56,6 +57,17 @@ def test_a_grid_does_not_change_with_the_array_that_it_was_made_from() -> None:
     assert grid.cells[0, 0] == 0
     with pytest.raises(ValueError, match="read-only"):
         grid.cells[0, 0] = 100
+
+
+def test_a_read_only_view_of_a_writable_array_is_copied() -> None:
+    cells = np.zeros((2, 2), np.int8)
+    view = cells[:]
+    view.flags.writeable = False
+    grid = OccupancyGrid(view, 1.0)
+    cells[0, 0] = 100
+    assert grid.cells[0, 0] == 0
+    # What nobody can write is shared: moving a map copies no cells.
+    assert np.shares_memory(grid.moved(Pose2(1)).cells, grid.cells)
 
 
 def test_percentages_between_the_thresholds_are_known_but_neither_wall_nor_floor() -> None:
@@ -172,6 +184,51 @@ def test_coarser_cells_keep_thin_walls() -> None:
     assert np.count_nonzero(coarse.occupied) == 10
 
 
+@pytest.mark.parametrize("resolution", [0.06, 0.07, 0.074, 0.11, 0.12])
+def test_no_thin_wall_slips_between_coarser_cells(resolution: float) -> None:
+    # Less than half a cell more than a whole ratio: asking at that many places would not be enough.
+    for col in range(30):
+        wall = np.zeros((30, 30), np.int8)
+        wall[:, col] = 100
+        coarse = at_resolution(OccupancyGrid(wall, 0.05), resolution)
+        assert coarse.occupied.any(axis=1).all(), col
+
+
+@pytest.mark.parametrize("keep", ["walls", "mean"])
+@pytest.mark.parametrize("block", [1, 20, 45, 100])
+def test_blocks_of_rows_do_not_change_the_sample(
+    keep: str, block: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(5)
+    grid = OccupancyGrid(rng.integers(-1, 101, (60, 60)).astype(np.int8), 0.5, Pose2(-10, -18, 0.3))
+    target = OccupancyGrid(np.zeros((23, 20), np.int8), 0.8, Pose2(-6, -7))
+    whole = resample(grid, Pose2(0.4, 0.2, 0.7), target, keep=keep)
+    assert (whole[-1] >= 0).any()  # there is something to get wrong in the last rows
+    monkeypatch.setattr("mapmeld.grid._BLOCK_CELLS", block)
+    np.testing.assert_array_equal(resample(grid, Pose2(0.4, 0.2, 0.7), target, keep=keep), whole)
+
+
+@pytest.mark.parametrize(("fine", "coarse"), [(0.05, 5.001), (0.001, 1.0), (1e-9, 1e9)])
+def test_cell_sizes_a_hundred_times_apart_are_a_mistake(fine: float, coarse: float) -> None:
+    a, b = drawn("#.", resolution=fine), drawn("#.", resolution=coarse)
+    for one, other in ((a, b), (b, a)):
+        for mistaken in (
+            lambda one=one, other=other: resample(one, Pose2(), other),
+            lambda one=one, other=other: mapmeld.match(one, other),
+        ):
+            with pytest.raises(ResolutionError, match="check the resolutions") as refused:
+                mistaken()
+            assert f"{fine:g} m" in str(refused.value)
+            assert f"{coarse:g} m" in str(refused.value)
+            assert "\n" not in str(refused.value)
+
+
+def test_cell_sizes_just_a_hundred_times_apart_are_laid_over_one_another() -> None:
+    a, b = drawn("#.", resolution=0.05), drawn("#.", resolution=5.0)
+    assert resample(a, Pose2(), b).tolist() == [[100, -1]]
+    assert resample(b, Pose2(), a).tolist() == [[100, 100]]
+
+
 def test_coarser_cells_may_take_the_mean() -> None:
     fine = OccupancyGrid(np.array([[0, 100], [-1, 50]], np.int8), 1.0)
     target = OccupancyGrid(np.zeros((1, 1), np.int8), 2.0)
@@ -192,6 +249,15 @@ def test_overlap_is_the_share_of_the_smaller_map() -> None:
     assert overlap_share(b, a, Pose2(8, 0).inverse()) == 0.5
     assert overlap_share(a, b, Pose2(0, 5)) == 0.0
     assert overlap_share(a, drawn("  "), Pose2()) == 0.0
+
+
+def test_overlap_looks_at_the_middles_of_cells() -> None:
+    a, b = drawn("." * 10), drawn("." * 4)
+    # Middles of b's cells at 9.1, 10.1, ... on a's 0 to 10: one of four. Two corners are inside.
+    assert overlap_share(a, b, Pose2(8.6, 0)) == 0.25
+    assert overlap_share(a, b, Pose2(8.4, 0)) == 0.5
+    # Turned half around, the corners of the outermost cells lie on the far edges.
+    assert overlap_share(a, b, Pose2(10, 1, math.pi)) == 1.0
 
 
 @given(poses, poses)

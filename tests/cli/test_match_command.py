@@ -105,6 +105,17 @@ def test_bare_images_need_a_resolution(tmp_path: Path) -> None:
     assert run("match", a, image, "--resolution", "nan").code == 2
 
 
+def test_resolutions_that_cannot_both_be_right_are_one_line(tmp_path: Path) -> None:
+    a, b = write_maps(tmp_path, "a", "b")
+    b.write_text(b.read_text().replace("resolution: 0.05", "resolution: 50"))
+    for command in (["match", a, b], ["match", b, a, "--json"], ["merge", a, b, "-o", tmp_path / "m.yaml"]):
+        outcome = run(*command)
+        assert outcome.code == 2
+        assert outcome.out == ""
+        assert "check the resolutions" in outcome.line
+    assert not (tmp_path / "m.yaml").exists()
+
+
 def test_settings_reach_the_method(tmp_path: Path) -> None:
     maps = write_maps(tmp_path, "a", "b")
     strict = tmp_path / "strict.yaml"

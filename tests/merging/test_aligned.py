@@ -7,7 +7,7 @@ from drawing import drawn, office, picture_of, seen_from
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapmeld.merging import merge_aligned
+from mapmeld.merging import MergeError, lattice_for_all, merge_aligned
 from mapmeld.se2 import Pose2
 
 poses = st.from_type(Pose2)
@@ -85,3 +85,31 @@ def test_the_first_pose_must_be_the_identity() -> None:
         merge_aligned([drawn("#")], [Pose2(1)])
     with pytest.raises(ValueError, match="as many"):
         merge_aligned([drawn("#")], [])
+
+
+# ------------------------------------------------------------------ the lattice for all
+def test_unknown_cells_around_a_map_extend_nothing() -> None:
+    a, b = drawn("....\n....\n...."), drawn("#.")
+    framed = b.extended(left=7, bottom=5, right=9, top=11)
+    for inner in (b, framed):
+        assert merge_aligned([a, inner], [Pose2(), Pose2(1, 1)]).shape == (3, 4)
+        assert lattice_for_all([a, inner], [Pose2(), Pose2(3, 1)]) == a.extended(0, 0, 1, 0)
+
+
+@pytest.mark.parametrize(
+    "T",
+    [Pose2(1e7, 1e7), Pose2(-1e7, 1e7, 1.0), Pose2(0, math.nan)],
+)
+def test_maps_out_of_all_reach_are_an_error_not_a_full_memory(T: Pose2) -> None:
+    a = drawn("\n".join(["." * 4] * 4), resolution=0.05)
+    for merging in (lattice_for_all, merge_aligned):
+        with pytest.raises(MergeError, match="check the poses and resolutions") as refused:
+            merging([a, a], [Pose2(), T])
+        assert "\n" not in str(refused.value)
+
+
+def test_the_largest_lattice_is_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mapmeld.merging.aligned.MAX_CELLS", 6)
+    assert lattice_for_all([drawn("."), drawn(".")], [Pose2(), Pose2(2, 1)]).shape == (2, 3)
+    with pytest.raises(MergeError, match="4 x 2 cells, more than 6"):
+        lattice_for_all([drawn("."), drawn(".")], [Pose2(), Pose2(3, 1)])

@@ -37,6 +37,8 @@ class Method:
     summary: str
 
 
+DEFAULT_METHOD = "correlative"
+
 METHODS: Mapping[str, Method] = {
     "correlative": Method(
         match_correlative,
@@ -71,7 +73,7 @@ def method_named(name: str) -> Method:
 
 
 def match(
-    a: OccupancyGrid, b: OccupancyGrid, method: str = "alphabet", parameters: object | None = None
+    a: OccupancyGrid, b: OccupancyGrid, method: str = DEFAULT_METHOD, parameters: object | None = None
 ) -> MatchResult:
     """Find how map b fits on map a.
 
@@ -95,8 +97,13 @@ def match(
     UnknownMethodError
         `method` is not known.
     TypeError
-        `parameters` is of another method's class.
+        `a` or `b` is not a map, or `parameters` is of another method's class.
     """
+    for name, grid in (("a", a), ("b", b)):
+        if not isinstance(grid, OccupancyGrid):
+            raise TypeError(
+                f"map {name} is a {type(grid).__name__}; mapmeld.load(path) reads a map from a file"
+            )
     chosen = method_named(method)
     if parameters is None:
         parameters = chosen.parameters()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mapmeld.grid import OccupancyGrid
 from mapmeld.io import load, save
-from mapmeld.matching import MatchResult, Verdict, match
+from mapmeld.matching import DEFAULT_METHOD, MatchResult, Verdict, match
 from mapmeld.merging.aligned import MergeError, merge_aligned
 from mapmeld.merging.fusion import check_fusion
 from mapmeld.se2 import Pose2
@@ -94,7 +94,7 @@ class MergeResult:
 def merge(
     maps: Sequence[OccupancyGrid | str | os.PathLike[str]],
     *,
-    method: str = "alphabet",
+    method: str = DEFAULT_METHOD,
     parameters: object | None = None,
     fusion: str = "colour",
     starts: Sequence[Pose2] | None = None,

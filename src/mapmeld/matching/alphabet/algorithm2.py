@@ -86,21 +86,30 @@ def match_alphabet(
         return MatchResult(T_a_b=None, verdict=Verdict.REJECTED, reason=_nothing_to_match_on(matching))
     best, *others = matching.fittings
     T_a_b = in_metres(best.T_1_2_px, *matching.maps)
-    accepted = best.similarity >= parameters.accept_similarity
+    alternatives = distinct_modes(
+        T_a_b, (Alternative(in_metres(f.T_1_2_px, *matching.maps), f.similarity) for f in others), b
+    )
+    verdict, reason = _verdict(best.similarity, alternatives, parameters)
     return MatchResult(
         T_a_b=T_a_b,
-        verdict=Verdict.ACCEPTED if accepted else Verdict.REJECTED,
-        reason=(
-            f"Jaccard similarity {best.similarity:.3f} of the walls is "
-            f"{'at least' if accepted else 'below'} the threshold {parameters.accept_similarity:g} "
-            f"(best of {len(matching.fittings)} fittings)"
-        ),
+        verdict=verdict,
+        reason=f"{reason} (best of {len(matching.fittings)} fittings)",
         similarity=best.similarity,
         overlap=overlap_share(a, b, T_a_b),
-        alternatives=distinct_modes(
-            T_a_b, (Alternative(in_metres(f.T_1_2_px, *matching.maps), f.similarity) for f in others), b
-        ),
+        alternatives=alternatives,
     )
+
+
+def _verdict(
+    similarity: float, alternatives: tuple[Alternative, ...], parameters: AlphabetParameters
+) -> tuple[Verdict, str]:
+    found = f"Jaccard similarity {similarity:.3f} of the walls is"
+    if similarity < parameters.accept_similarity:
+        return Verdict.REJECTED, f"{found} below the threshold {parameters.accept_similarity:g}"
+    rival = alternatives[0].similarity if alternatives else 0.0
+    if rival >= parameters.ambiguous_share * similarity:
+        return Verdict.AMBIGUOUS, f"{found} hardly above the {rival:.3f} of a different fitting"
+    return Verdict.ACCEPTED, f"{found} at least the threshold {parameters.accept_similarity:g}"
 
 
 def _nothing_to_match_on(matching: MapMatching) -> str:

@@ -34,6 +34,9 @@ class AlphabetParameters:
     accept_similarity
         Jaccard similarity from which a match is accepted. The paper accepts everything; see
         docs/methods.md for how this was set and what it does not promise.
+    ambiguous_share
+        A match that would be accepted is ambiguous if a truly different fitting reaches this share of
+        its similarity: a place that repeats itself looks alike in several positions.
     """
 
     corners: int = 30
@@ -46,6 +49,7 @@ class AlphabetParameters:
     candidates: int = 30
     median_px: int = 3
     accept_similarity: float = 0.15
+    ambiguous_share: float = 0.85
 
     def __post_init__(self) -> None:
         for setting in fields(self):
@@ -66,7 +70,7 @@ class AlphabetParameters:
         ):
             if not low <= getattr(self, name) <= high:
                 raise ValueError(f"{name} must be in {low}..{high}, not {getattr(self, name)}")
-        for name in ("corner_quality", "relation_max_share"):
+        for name in ("corner_quality", "relation_max_share", "ambiguous_share"):
             if not 0 < getattr(self, name) <= 1:
                 raise ValueError(f"{name} must be above 0 and at most 1, not {getattr(self, name)}")
         if self.median_px not in (1, 3, 5, 7, 9, 11):
