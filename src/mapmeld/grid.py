@@ -38,7 +38,7 @@ class ResolutionError(MapmeldError):
     """Two cell sizes that cannot both be right."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class OccupancyGrid:
     """A map: cells on a square lattice with its place in a metric frame.
 

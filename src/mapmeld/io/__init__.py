@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from mapmeld.grid import OccupancyGrid
 
-__all__ = ["FORMATS", "ImageFormat", "MapFileError", "MapFormat", "Mode", "load", "save"]
+__all__ = ["FORMATS", "ImageFormat", "MapFileError", "MapFormat", "Mode", "load", "printable", "save"]
 
 Mode = Literal["trinary", "scale", "raw"]
 ImageFormat = Literal["pgm", "png"]
@@ -29,8 +29,12 @@ class MapFileError(MapmeldError):
     @classmethod
     def of(cls, path: AnyPath, problem: str) -> MapFileError:
         """Return the error ``path: problem`` on one line, whatever characters the two hold."""
-        line = f"{os.fspath(path)}: {problem}"
-        return cls("".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line))
+        return cls(printable(f"{os.fspath(path)}: {problem}"))
+
+
+def printable(text: str) -> str:
+    """Return a text on one line, with escapes (``\\n``, ``\\x1b``) for what would not show as it is."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 # ---------------------------------------------------------------------- the readers
@@ -109,6 +113,8 @@ def load(
         ending = os.path.splitext(name)[1].lower()  # noqa: PTH122  (not every path is a file name)
         found = next((kind for kind in FORMATS.values() if ending in kind.suffixes), None)
         if found is None:
+            if os.path.isdir(name):  # noqa: PTH112  (as above)
+                raise MapFileError.of(name, "is a folder; name the map file in it")
             known = " ".join(suffix for kind in FORMATS.values() for suffix in kind.suffixes)
             raise MapFileError.of(name, f"not a known kind of map file (known: {known})")
         return found.read(name, resolution)

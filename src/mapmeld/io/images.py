@@ -62,7 +62,7 @@ class Raster:
 
 # ---------------------------------------------------------------------- reading
 @contextmanager
-def open_regular(path: AnyPath) -> Iterator[tuple[BufferedReader, int]]:
+def open_regular(path: AnyPath, *, may_be_empty: bool = False) -> Iterator[tuple[BufferedReader, int]]:
     """Open a plain file for reading and give it with its size [bytes].
 
     Pipes and devices, which could block or never end, are refused before they are opened.
@@ -70,7 +70,7 @@ def open_regular(path: AnyPath) -> Iterator[tuple[BufferedReader, int]]:
     Raises
     ------
     MapFileError
-        No such file, not a plain file, empty, or not readable.
+        No such file, not a plain file, empty (unless that is allowed), or not readable.
     """
     try:
         mode = Path(path).stat().st_mode
@@ -80,7 +80,7 @@ def open_regular(path: AnyPath) -> Iterator[tuple[BufferedReader, int]]:
             raise MapFileError.of(path, "is not a plain file (a pipe or device?), so it is not read")
         with open(path, "rb") as file:  # noqa: PTH123  (the path is kept as it was given)
             size = os.fstat(file.fileno()).st_size
-            if size == 0:
+            if size == 0 and not may_be_empty:
                 raise MapFileError.of(path, "is empty")
             yield file, size
     except FileNotFoundError:

@@ -11,10 +11,9 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, get_args
+from typing import Any, NoReturn, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +21,12 @@ from numpy.typing import NDArray
 from mapmeld.grid import FREE, OCCUPIED, UNKNOWN, Cells, OccupancyGrid
 from mapmeld.io import AnyPath, ImageFormat, MapFileError, Mode
 from mapmeld.io.atomic import check_targets, write_files
-from mapmeld.io.images import MAX_CELLS, Raster, open_regular, pgm_pieces, png_pieces, read_image
+from mapmeld.io.images import MAX_CELLS, Raster, pgm_pieces, png_pieces, read_image
+from mapmeld.io.plain_yaml import Scalar, Value, read_fields, short
 from mapmeld.se2 import Pose2
 
-if TYPE_CHECKING:
-    import yaml
-
-MAX_YAML_BYTES = 1 << 16
-"""Largest YAML file that is read; map_server writes about 150 bytes."""
-
-MAX_YAML_DEPTH = 20
-"""Deepest nesting that is read; the parser's time grows with the square of it."""
+MAX_ORIGIN_YAW = 1e6
+"""Greatest yaw of an origin [rad]; a sign of another unit or a broken file, and inexact beyond."""
 
 # The greys of mode "trinary".
 FREE_GREY, UNKNOWN_GREY, OCCUPIED_GREY = 254, 205, 0
@@ -210,7 +204,7 @@ def read_description(path: AnyPath) -> MapDescription:
         fields.fail("its 'image' is empty; name the image file")
     mode = fields.text("mode", "trinary")
     if mode not in get_args(Mode):
-        fields.fail(f"its 'mode' is {_short(mode)}, not one of {', '.join(get_args(Mode))}")
+        fields.fail(f"its 'mode' is {short(mode)}, not one of {', '.join(get_args(Mode))}")
     resolution = fields.number("resolution")
     if not (math.isfinite(resolution) and resolution > 0):
         fields.fail(f"its 'resolution' is {resolution}, not a positive number of metres")
@@ -225,10 +219,14 @@ def read_description(path: AnyPath) -> MapDescription:
             f"its 'free_thresh' {free_thresh} is not below its 'occupied_thresh' {occupied_thresh};"
             " are they the wrong way round?"
         )
+    origin = fields.pose("origin")
+    problem = _problem_of_origin(origin, resolution)
+    if problem is not None:
+        fields.fail(f"its {problem}")
     return MapDescription(
         image=Path(path).parent / name,
         resolution=resolution,
-        origin=fields.pose("origin"),
+        origin=origin,
         mode=mode,  # type: ignore[arg-type]  # checked above
         negate=fields.flag("negate", False),
         occupied_thresh=occupied_thresh,
@@ -236,17 +234,17 @@ def read_description(path: AnyPath) -> MapDescription:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Scalar:
-    value: str
-    quoted: bool
+def _problem_of_origin(origin: Pose2, resolution: float) -> str | None:
+    """Return what is wrong with an origin for cells of that size [m]; None if nothing is."""
+    if math.ulp(max(abs(origin.x), abs(origin.y))) > resolution / 1000:
+        return (
+            f"origin [{origin.x}, {origin.y}, {origin.theta}] is too far from zero for cells of {resolution} m:"
+            " numbers of that size cannot tell the cells apart"
+        )
+    if abs(origin.theta) > MAX_ORIGIN_YAW:
+        return f"origin has a yaw of {origin.theta} rad, beyond the {MAX_ORIGIN_YAW:,.0f} that are taken"
+    return None
 
-
-class _Nested:
-    """Stands for a value that no field of a map has."""
-
-
-_Value = _Scalar | list["_Scalar | _Nested"] | _Nested
 
 # YAML 1.2's numbers, as yaml-cpp reads and writes them. PyYAML knows YAML 1.1, where 1e-05 is a text.
 _NUMBER = re.compile(
@@ -264,120 +262,23 @@ _FLAGS = {
 }
 
 
-def _short(text: str) -> str:
-    return repr(text if len(text) <= 40 else text[:37] + "...")
-
-
-def _line(event: yaml.Event) -> int:
-    return event.start_mark.line + 1 if event.start_mark else 1
-
-
 class _Fields:
-    """The fields of a YAML file, taken from the parser's events.
-
-    Nothing in the file is ever built into an object, and no alias expanded: a map needs neither.
-    """
+    """The fields of a map's YAML file, by kind."""
 
     def __init__(self, path: AnyPath) -> None:
-        import yaml
-
         self._path = path
-        self._values: dict[str, _Value] = {}
-        with open_regular(path) as (file, size):
-            if size > MAX_YAML_BYTES:
-                self.fail(
-                    f"is too large for the YAML file of a map ({size:,} bytes, {MAX_YAML_BYTES:,} at most)"
-                )
-            data = file.read(MAX_YAML_BYTES)
-        try:
-            text = data.decode("utf-8")
-        except UnicodeDecodeError:
-            self.fail("is not a YAML file (it is not UTF-8 text); an image needs the format 'image'")
-        try:
-            self._collect(yaml.parse(text, Loader=yaml.SafeLoader))
-        except yaml.MarkedYAMLError as error:
-            where = f" in line {error.problem_mark.line + 1}" if error.problem_mark else ""
-            problem = str(error.problem or error.context)
-            hint = " (YAML takes spaces, not tabs)" if "\\t" in problem else ""
-            self.fail(f"is not valid YAML{where}: {problem[:150]}{hint}")
-        # Characters and versions with numbers out of range get past the parser's own errors.
-        except (yaml.YAMLError, ValueError, OverflowError) as error:
-            self.fail(f"is not valid YAML: {' '.join(str(error).split())[:150]}")
+        self._values = read_fields(path, "the YAML file of a map")
 
     def fail(self, problem: str) -> NoReturn:
         raise MapFileError.of(self._path, problem)
 
-    # ------------------------------------------------------------------ events to values
-    def _collect(self, events: Iterator[yaml.Event]) -> None:
-        import yaml
-
-        events = self._harmless(events)
-        begun = False
-        for event in events:
-            if isinstance(event, yaml.MappingStartEvent):
-                begun = True
-                break
-            if isinstance(event, yaml.NodeEvent):
-                break
-        if not begun:
-            self.fail("is not the YAML file of a map (it has no 'key: value' lines)")
-        for event in events:
-            if isinstance(event, yaml.MappingEndEvent):
-                return  # what follows, such as a second document, is not read, as in nav2
-            if not isinstance(event, yaml.ScalarEvent):
-                self.fail(f"has a key that is no plain word, in line {_line(event)}")
-            if event.value in self._values:
-                self.fail(f"gives '{event.value}' twice, in line {_line(event)} again")
-            self._values[event.value] = self._value(events)
-
-    def _value(self, events: Iterator[yaml.Event]) -> _Value:
-        import yaml
-
-        event = next(events)
-        if isinstance(event, yaml.ScalarEvent):
-            return _Scalar(event.value, quoted=event.style is not None)
-        items: list[_Scalar | _Nested] = []
-        is_list = isinstance(event, yaml.SequenceStartEvent)
-        depth = 1
-        while depth:
-            event = next(events)
-            if isinstance(event, yaml.CollectionStartEvent):
-                depth += 1
-                items.append(_Nested())
-            elif isinstance(event, yaml.CollectionEndEvent):
-                depth -= 1
-            elif depth == 1 and isinstance(event, yaml.ScalarEvent):
-                items.append(_Scalar(event.value, quoted=event.style is not None))
-        return items if is_list else _Nested()
-
-    def _harmless(self, events: Iterator[yaml.Event]) -> Iterator[yaml.Event]:
-        """Refuse what could multiply (aliases), make objects (tags) or keep the parser busy (depth)."""
-        import yaml
-
-        depth = 0
-        for event in events:
-            if isinstance(event, yaml.NodeEvent) and event.anchor is not None:
-                self.fail(f"uses a YAML anchor or alias in line {_line(event)}, which a map has no need of")
-            tag = getattr(event, "tag", None) if isinstance(event, yaml.NodeEvent) else None
-            if tag is not None:
-                self.fail(
-                    f"uses the YAML tag {_short(tag)} in line {_line(event)}, which a map has no need of"
-                )
-            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-            if depth > MAX_YAML_DEPTH:
-                self.fail(
-                    f"nests more than {MAX_YAML_DEPTH} levels deep in line {_line(event)}; a map takes two"
-                )
-            yield event
-
-    # ------------------------------------------------------------------ values by kind
     def text(self, key: str, default: str | None = None) -> str:
         value = self._values.get(key)
         if value is None:
             if default is None:
                 self._missing(key)
             return default
-        if not isinstance(value, _Scalar):
+        if not isinstance(value, Scalar):
             self.fail(f"its '{key}' is not a text")
         return value.value
 
@@ -393,7 +294,7 @@ class _Fields:
         value = self._values.get(key)
         if value is None:
             return default
-        if isinstance(value, _Scalar) and not value.quoted:
+        if isinstance(value, Scalar) and not value.quoted:
             if value.value.lower() in _FLAGS:
                 return _FLAGS[value.value.lower()]
             if re.fullmatch(r"[-+]?[0-9]{1,9}", value.value):
@@ -411,13 +312,13 @@ class _Fields:
             self.fail(f"its '{key}' is [{x}, {y}, {yaw}], but must be finite")
         return Pose2(x, y, yaw)
 
-    def _number(self, key: str, value: _Value) -> float:
-        if not isinstance(value, _Scalar):
+    def _number(self, key: str, value: Value) -> float:
+        if not isinstance(value, Scalar):
             self.fail(f"its '{key}' is not a number")
         if _NUMBER.fullmatch(value.value) is None:
-            self.fail(f"its '{key}' is {_short(value.value)}, which is not a number")
+            self.fail(f"its '{key}' is {short(value.value)}, which is not a number")
         if value.quoted:
-            self.fail(f"its '{key}' is the text {_short(value.value)}; write the number without quotes")
+            self.fail(f"its '{key}' is the text {short(value.value)}; write the number without quotes")
         return float(re.sub(r"\.(?=[iInN])", "", value.value))
 
     def _missing(self, key: str) -> NoReturn:
@@ -489,6 +390,9 @@ def write_map(
         raise MapFileError.of(
             path, f"the map has {grid.cells.size:,} cells; from 1 to {MAX_CELLS:,} can be written"
         )
+    problem = _problem_of_origin(grid.origin, grid.resolution)
+    if problem is not None:  # the file could not be read again
+        raise MapFileError.of(path, f"the map's {problem}")
     image_path = yaml_path.with_suffix(f".{image_format}")
     if not image_path.name.isprintable():
         raise MapFileError.of(

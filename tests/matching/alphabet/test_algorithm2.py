@@ -1,4 +1,5 @@
 import math
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -9,7 +10,13 @@ from hypothesis import strategies as st
 import mapmeld
 from mapmeld.grid import OccupancyGrid
 from mapmeld.matching import Verdict
-from mapmeld.matching.alphabet import AlphabetParameters, map_matching, match_alphabet
+from mapmeld.matching.alphabet import (
+    AlphabetParameters,
+    in_metres,
+    map_matching,
+    match_alphabet,
+    preprocess,
+)
 from mapmeld.se2 import Pose2
 
 A = office()
@@ -47,6 +54,54 @@ def test_maps_of_different_resolution_are_matched_at_the_coarser(resolution: flo
     assert degrees < 1.0
     matching = map_matching(A, other, AlphabetParameters())
     assert {m.resolution for m in matching.maps} == {max(0.05, resolution)}
+
+
+# A part of the office: the greatest distance among its corners is smaller than in the whole.
+PART = OccupancyGrid(A.cells[:150, :170], A.resolution)
+
+
+@pytest.mark.parametrize(("a", "b"), [(A, PART), (PART, A)])
+@pytest.mark.parametrize("share", [1.0, 0.5])
+@pytest.mark.parametrize("least", [18.0, 70.0])
+def test_both_alphabets_have_the_same_bounds(
+    a: OccupancyGrid, b: OccupancyGrid, share: float, least: float
+) -> None:
+    parameters = AlphabetParameters(relation_max_share=share, relation_min_px=least)
+    alphabets = map_matching(a, b, parameters).alphabets
+    distances = []
+    for alphabet in alphabets:
+        x, y = alphabet.corners_px.T
+        distances.append(np.hypot(x[:, None] - x, y[:, None] - y))
+    small, large = sorted(float(d.max()) for d in distances)
+    assert small < 0.8 * large  # else the two maps could not be told apart
+    for alphabet, distance in zip(alphabets, distances, strict=True):
+        expected = np.argwhere((distance >= least - 1e-6) & (distance <= share * large + 1e-6))
+        assert np.stack([alphabet.letter, alphabet.other], axis=1).tolist() == expected.tolist()
+        assert ((distance > 0) & (distance < least)).any()
+
+
+def test_the_size_of_the_median_holds_for_both_maps() -> None:
+    matching = map_matching(A, B, AlphabetParameters(median_px=1))
+    for grid, image in zip((A, B), matching.preprocessed, strict=True):
+        np.testing.assert_array_equal(image, preprocess(grid, 1))
+        assert (image != preprocess(grid)).any()
+
+
+def test_alternatives_are_other_modes_best_first() -> None:
+    result = match_alphabet(A, B)
+    similarities = [result.similarity, *(other.similarity for other in result.alternatives)]
+    assert len(similarities) > 5
+    assert all(one > next_one for one, next_one in pairwise(similarities))
+    middle = B.lattice_to_metres((B.shape[1] / 2, B.shape[0] / 2))
+    assert result.T_a_b is not None
+    modes = [result.T_a_b, *(other.T_a_b for other in result.alternatives)]
+    for one, other in combinations(modes, 2):
+        metres = float(np.hypot(*(one.apply(middle) - other.apply(middle))))
+        assert metres > 0.5 or one.distance_to(other)[1] > math.radians(5)
+    # Every other fitting repeats one of them.
+    matching = map_matching(A, B, AlphabetParameters())
+    assert len(matching.fittings) > len(modes)
+    assert modes[0] == in_metres(matching.fittings[0].T_1_2_px, A, B)
 
 
 @settings(max_examples=20)

@@ -1,7 +1,10 @@
+import math
+
 import numpy as np
 import pytest
 
-from mapmeld.matching.alphabet import generate_alphabet, greatest_distance
+from mapmeld.matching.alphabet import compare_alphabets, generate_alphabet, greatest_distance
+from mapmeld.se2 import Pose2
 
 # A right angle at the middle letter and a far corner:  2 (0, 4)
 #                                                       0 (0, 0)   1 (3, 0)        3 (100, 0)
@@ -42,3 +45,17 @@ def test_the_greatest_distance(corners: np.ndarray, distance: float) -> None:
 
 def test_bounds_the_wrong_way_round_leave_letters_without_relations() -> None:
     assert len(generate_alphabet(CORNERS, 5.0, 4.0).letter) == 0
+
+
+@pytest.mark.parametrize(("least", "greatest"), [(18.0, 1000.0), (1.0, 30.0)])
+def test_relations_as_long_as_a_bound_stay_so_wherever_the_map_lies(least: float, greatest: float) -> None:
+    corners = np.array([(0, 0), (18, 0), (0, 30)], float)
+    alphabet = generate_alphabet(corners, least, greatest)
+    gamma = compare_alphabets(alphabet, alphabet, 1.1, math.radians(1.1))
+    assert gamma[0, 0] == 1  # 18 and 30 are both in
+    for T in np.random.default_rng(0).uniform((-100, -100, -math.pi), (100, 100, math.pi), (200, 3)):
+        moved = generate_alphabet(Pose2(*T).apply(corners), least, greatest)
+        assert moved.letter.tolist() == alphabet.letter.tolist()
+        assert moved.other.tolist() == alphabet.other.tolist()
+        for one, other in ((alphabet, moved), (moved, alphabet)):
+            np.testing.assert_array_equal(compare_alphabets(one, other, 1.1, math.radians(1.1)), gamma)

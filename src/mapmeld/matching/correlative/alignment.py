@@ -30,7 +30,10 @@ def turn_and_shift(t: Doubles) -> tuple[Plane, Plane]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WallPairs:
-    """Wall points of b, then of a, against the nearest wall of the other map; arrays (k, m), a's local frame."""
+    """Wall points of b, then of a, against the nearest walls of the other map.
+
+    All arrays are (k, m), a row for each transform, in a's local frame.
+    """
 
     x: Plane  # b's points moved by T, a's points as they are
     e: Plane  # from a's wall to b's
@@ -50,15 +53,18 @@ class WallPairs:
 
 
 def look_up(pa: WallMap, pb: WallMap, t: Doubles, n: int, u: Plane | None = None) -> WallPairs:
-    """Look up n points of each map under every t (k, 3); `u` (m,) bends b's walls further, seen in a's frame."""
+    """Look up n points of each map under every t (k, 3).
+
+    `u` (k, m) displaces b's walls further, as seen in a's frame.
+    """
     turn, shift = turn_and_shift(t)
     b, a = pb.points[:n], pa.points[:n]
     x = turn * b + shift
-    moved = x if u is None else x + u[: len(b)]
+    moved = x if u is None else x + u[:, : len(b)]
     at_a = pa.at(moved)
     j = pa.nearest[at_a]
     inverse = turn.conj()
-    y = ((a if u is None else a - u[len(b) :]) - shift) * inverse
+    y = ((a if u is None else a - u[:, len(b) :]) - shift) * inverse
     at_b = pb.at(y)
     i = pb.nearest[at_b]
     k = len(t)

@@ -21,57 +21,67 @@ _POINTS = 500
 
 
 def smooth_bending(pa: WallMap, pb: WallMap, t: Doubles, x: Plane) -> Plane:
-    """Displacement at x (m,) that bends b smoothly onto a.
+    """Return the displacement at x (k, m) that bends b smoothly onto a, for each t (k, 3).
 
-    Real maps stretch and bend by drift. A displacement quadratic in x and y, held by springs, takes
-    up what is smooth of it, so that what remains can be judged by a narrow tolerance.
+    Outside of what is matched the quadratic is held at its edge, so that it cannot run away.
     """
-    p = look_up(pa, pb, t[None], _POINTS)
+    p = look_up(pa, pb, t, _POINTS)
     _, w = robust_weights(p, 1.0)
-    mass = float(w.sum()) + 1e-6
-    centre = complex((w * p.x).sum()) / mass
-    size = max(math.sqrt(float((w * np.abs(p.x - np.complex64(centre)) ** 2).sum()) / mass), 1.0)
-
-    def basis(z: Plane) -> Floats:
-        # Outside of what is matched the polynomial must not run away.
-        i, j = (np.clip(v, -2, 2) for v in (((z - centre) / size).real, ((z - centre) / size).imag))
-        return np.stack([np.ones_like(i), i, j, i * i, i * j, j * j]).astype(np.float32)
-
-    at_points = basis(p.x[0])
-    stiff = np.diag(np.tile([0.05, 1, 1, 1, 1, 1], 2)) * _SPRING
-    turn = np.zeros(12)  # a small turn, (-y, x), is no bending
-    turn[2], turn[7] = -math.sqrt(0.5), math.sqrt(0.5)
-    stiff -= 0.95 * _SPRING * np.outer(turn, turn)
-    c = np.zeros(12)
+    mass = w.sum(axis=1, keepdims=True) + np.float32(1e-6)
+    centre = (w * p.x).sum(axis=1, keepdims=True) / mass
+    spread = np.sqrt((w * np.abs(p.x - centre) ** 2).sum(axis=1, keepdims=True) / mass)
+    at_points = _quadratic((p.x - centre) / np.maximum(spread, 1))
+    c = np.zeros((len(t), 12))
+    stiffness = _stiffness()
     for scale in _SCALES:
         r, w = robust_weights(p, scale)
-        J = np.concatenate([p.normal.real * at_points, p.normal.imag * at_points])
-        Jw = J * w
-        c -= np.linalg.solve(
-            (Jw @ J.T).astype(np.float64) + stiff, (Jw @ r[0]).astype(np.float64) + stiff @ c
-        )
-        u = ((c[:6] + 1j * c[6:]) @ at_points).astype(np.complex64)
+        J = np.concatenate([p.normal.real[:, None] * at_points, p.normal.imag[:, None] * at_points], axis=1)
+        Jw = J * w[:, None]
+        H = np.matmul(Jw, J.transpose(0, 2, 1)).astype(np.float64) + stiffness
+        g = np.matmul(Jw, r[..., None])[..., 0].astype(np.float64) + c @ stiffness
+        c -= np.linalg.solve(H, g[..., None])[..., 0]
         if scale != _SCALES[-1]:
-            p = look_up(pa, pb, t[None], _POINTS, u)
-    return np.asarray(((c[:6] + 1j * c[6:]) @ basis(x)).astype(np.complex64))
+            p = look_up(pa, pb, t, _POINTS, _displacement(c, at_points))
+    return _displacement(c, _quadratic((x - centre) / np.maximum(spread, 1)))
+
+
+def _quadratic(z: Plane) -> Floats:
+    """Return the six monomials (k, 6, m) of z (k, m)."""
+    x, y = np.clip(z.real, -2, 2), np.clip(z.imag, -2, 2)
+    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1).astype(np.float32)
+
+
+def _displacement(c: Doubles, monomials: Floats) -> Plane:
+    coefficients = (c[:, :6] + 1j * c[:, 6:]).astype(np.complex64)
+    return np.asarray(np.matmul(coefficients[:, None], monomials)[:, 0])
+
+
+def _stiffness() -> Doubles:
+    stiffness = np.diag(np.tile([0.05, 1, 1, 1, 1, 1], 2)) * _SPRING
+    turn = np.zeros(12)  # a small turn, (-y, x), is no bending
+    turn[2], turn[7] = -math.sqrt(0.5), math.sqrt(0.5)
+    return np.asarray(stiffness - 0.95 * _SPRING * np.outer(turn, turn))
 
 
 def patches_of(x: Plane) -> tuple[Index, int]:
-    """Return the number of the PATCH x PATCH square that each point lies in, and how many there are."""
+    """Return the number of the square patch in which each point x (k, m) lies, and how many there are.
+
+    No two rows share a patch.
+    """
     col, row = np.floor(x.real / PATCH).astype(np.intp), np.floor(x.imag / PATCH).astype(np.intp)
     col -= col.min()
     row -= row.min()
-    patch = row * (col.max() + 1) + col
-    return patch, int(patch.max()) + 1
+    cols, rows = int(col.max()) + 1, int(row.max()) + 1
+    return (np.arange(len(x))[:, None] * rows + row) * cols + col, len(x) * rows * cols
 
 
 def patch_shifts(p: WallPairs, patch: Index, count: int) -> Plane:
-    """Shift (count,) of each patch that brings its walls together, held by a spring."""
-    r, w = (v[0] for v in robust_weights(p, 0.4))
-    nx, ny = p.normal[0].real, p.normal[0].imag
+    """Return the shift (count,) of each patch that brings its walls together, held by a spring."""
+    r, w = robust_weights(p, 0.4)
+    nx, ny = p.normal.real, p.normal.imag
     wx, wy = w * nx, w * ny
     xx, xy, yy, gx, gy = (
-        np.asarray(np.bincount(patch, v, count), np.float64)
+        np.asarray(np.bincount(patch.ravel(), v.ravel(), count), np.float64)
         for v in (wx * nx, wx * ny, wy * ny, wx * r, wy * r)
     )
     xx, yy = xx + PATCH_SPRING, yy + PATCH_SPRING
@@ -80,10 +90,10 @@ def patch_shifts(p: WallPairs, patch: Index, count: int) -> Plane:
 
 
 def nearest_rigid(t: Doubles, x: Plane, u: Plane, w: Floats) -> Doubles:
-    """Least squares rigid motion for x -> x + u, weighted, after t."""
-    total = float(w.sum()) + 1e-6
-    centre, shift = complex(w @ x) / total, complex(w @ u) / total
-    arm = x - np.complex64(centre)
-    angle = float(w @ (arm.conj() * u).imag) / (float(w @ (arm.real**2 + arm.imag**2)) + 1e-6)
-    moved = (complex(t[0], t[1]) - centre) * complex(math.cos(angle), math.sin(angle)) + centre + shift
-    return np.array([moved.real, moved.imag, t[2] + angle])
+    """Return the rigid transforms (k, 3) nearest to t (k, 3) followed by x -> x + u, weighted by w (k, m)."""
+    total = w.sum(axis=1) + 1e-6
+    centre, shift = (w * x).sum(axis=1) / total, (w * u).sum(axis=1) / total
+    arm = x - centre[:, None].astype(np.complex64)
+    angle = (w * (arm.conj() * u).imag).sum(axis=1) / ((w * np.abs(arm) ** 2).sum(axis=1) + 1e-6)
+    moved = (t[:, 0] + 1j * t[:, 1] - centre) * np.exp(1j * angle) + centre + shift
+    return np.stack([moved.real, moved.imag, t[:, 2] + angle], axis=1)

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from mapmeld.matching.correlative.alignment import WallPairs, look_up, turn_and_shift
 from mapmeld.matching.correlative.bending import nearest_rigid, patch_shifts, patches_of, smooth_bending
-from mapmeld.matching.correlative.covariance import transform_covariance
-from mapmeld.matching.correlative.wall_map import Doubles, Floats, Plane, WallMap
+from mapmeld.matching.correlative.wall_map import Doubles, Floats, WallMap
 
 HIT = 0.1  # [m] across the wall: explained by the other map's wall
 NEAR = 0.3  # [m] next to the other map's wall
@@ -40,10 +39,6 @@ class Evidence:
         Area known in both [m^2], and its share of the smaller map.
     weak
         Explained wall that fixes the least fixed direction [m]; small along corridors.
-    middle
-        Middle of what is explained, in a's local frame.
-    covariance
-        3 x 3, of (x, y, theta) of the transform between the metric frames [m, m, rad].
     unbent
         The rigid transform (local frames, (3,)) nearest to the bent one.
     """
@@ -59,9 +54,12 @@ class Evidence:
     overlap_area: float
     overlap: float
     weak: float
-    middle: complex
-    covariance: Doubles
     unbent: Doubles
+
+    @property
+    def shares(self) -> tuple[float, float]:
+        """Shares of the tested wall that are explained, after bending, and contradicted, as it lies."""
+        return self.hit_bent / self.wall, self.contra / self.wall
 
     @property
     def surplus(self) -> float:
@@ -99,69 +97,68 @@ class Evidence:
         return -math.log(self.contra_bent / self.wall + 0.02)
 
 
-def evidence(pa: WallMap, pb: WallMap, t: Doubles, n: int = 1200) -> Evidence:
-    """Measure how both maps explain each other under t (3,), which takes b's local frame into a's."""
+def weigh(pa: WallMap, pb: WallMap, t: Doubles, n: int = 1200) -> list[Evidence]:
+    """Measure how both maps explain each other under each t (k, 3), which takes b's local frame into a's.
+
+    `n` wall points of each map are looked at.
+    """
     metres = _metres(pa, pb, n)
-    rigid = look_up(pa, pb, t[None], n)
-    x = rigid.x[0]
-    u = smooth_bending(pa, pb, t, x)
-    smooth = look_up(pa, pb, t[None], n, u)
-    patch, patches = patches_of(x)
-    u = u + patch_shifts(smooth, patch, patches)[patch]
-    bent = look_up(pa, pb, t[None], n, u)
+    rigid = look_up(pa, pb, t, n)
+    u = smooth_bending(pa, pb, t, rigid.x)
+    patch, patches = patches_of(rigid.x)
+    u = u + patch_shifts(look_up(pa, pb, t, n, u), patch, patches)[patch]
+    bent = look_up(pa, pb, t, n, u)
 
-    near = np.minimum(np.abs(rigid.e), np.abs(bent.e))[0] < NEAR
-    inside = near | (rigid.depth[0] >= 0) | (bent.depth[0] >= 0)
-    hit = _hits(bent)
-    explained = metres * hit
-    total = float(explained.sum()) + 1e-6
-    bend = math.sqrt(float(explained @ (u.real**2 + u.imag**2)) / total)
-    line = explained * (bent.straight[0] > 0.3)
-    nx, ny = bent.normal[0].real, bent.normal[0].imag
-    xx, xy, yy = float(line @ (nx * nx)), float(line @ (nx * ny)), float(line @ (ny * ny))
-
-    turn, shift = turn_and_shift(t[None])
-    on_a, on_b = (
-        pa.depth[pa.at(turn[0] * pb.floor + shift[0])],
-        pb.depth[pb.at((pa.floor - shift[0]) * turn[0].conj())],
+    near = np.minimum(np.abs(rigid.e), np.abs(bent.e)) < NEAR
+    inside = near | (rigid.depth >= 0) | (bent.depth >= 0)
+    explained = metres * _hits(bent)
+    hit_bent = explained.sum(axis=1) + 1e-6
+    line = explained * (bent.straight > 0.3)
+    nx, ny = bent.normal.real, bent.normal.imag
+    xx, xy, yy = (np.sum(line * v, axis=1) for v in (nx * nx, nx * ny, ny * ny))
+    area, close, deep = _common_floor(pa, pb, t)
+    columns = zip(
+        (inside @ metres + 1e-6).tolist(),
+        ((_hits(rigid) & inside) @ metres).tolist(),
+        hit_bent.tolist(),
+        ((rigid.depth > DEEP) @ metres).tolist(),
+        ((np.minimum(rigid.depth, bent.depth) > DEEP) @ metres).tolist(),
+        close.tolist(),
+        deep.tolist(),
+        np.sqrt((explained * (u.real**2 + u.imag**2)).sum(axis=1) / hit_bent).tolist(),
+        area.tolist(),
+        (area / min(pa.area, pb.area)).tolist(),
+        np.maximum(0, (xx + yy) / 2 - np.hypot((xx - yy) / 2, xy)).tolist(),
+        nearest_rigid(t, rigid.x, u, explained),
+        strict=True,
     )
-    area = 0.5 * (float((on_a >= 0).mean()) * pb.area + float((on_b >= 0).mean()) * pa.area)
-    close, deep = _by_chance(pa, pb, turn[0], shift[0])
-    return Evidence(
-        wall=float(metres @ inside) + 1e-6,
-        hit=float(metres @ (_hits(rigid) & inside)),
-        hit_bent=total,
-        contra=float(metres @ (rigid.depth[0] > DEEP)),
-        contra_bent=float(metres @ (np.minimum(rigid.depth, bent.depth)[0] > DEEP)),
-        chance=close,
-        chance_deep=deep,
-        bend=bend,
-        overlap_area=area,
-        overlap=area / min(pa.area, pb.area),
-        weak=max(0.0, (xx + yy) / 2 - math.hypot((xx - yy) / 2, xy)),
-        middle=complex(explained @ x) / total,
-        covariance=transform_covariance(pa, pb, t, rigid, patch, patches, bend),
-        unbent=nearest_rigid(t, x, u, explained),
-    )
+    return [Evidence(*figures) for figures in columns]
 
 
-def _by_chance(pa: WallMap, pb: WallMap, turn: Plane, shift: Plane) -> tuple[float, float]:
-    """Shares of the common floor within HIT of the other map's wall, and deep in its free space."""
-    close = deep = both = 0
-    for p, z in ((pa, turn * pb.floor + shift), (pb, (pa.floor - shift) * turn.conj())):
-        i = p.at(z)
-        depth = p.depth[i]
+def _common_floor(pa: WallMap, pb: WallMap, t: Doubles) -> tuple[Doubles, Doubles, Doubles]:
+    """Return, for each t (k, 3), what is known in both maps.
+
+    Its area [m^2], and its shares within `HIT` of the other map's wall and deep in its free space.
+    """
+    turn, shift = turn_and_shift(t)
+    area, close, deep, both = np.zeros((4, len(t)))
+    for p, other, z in ((pa, pb, turn * pb.floor + shift), (pb, pa, (pa.floor - shift) * turn.conj())):
+        at = p.at(z)
+        depth = p.depth[at]
         known = depth >= 0
-        both += int(np.count_nonzero(known))
-        close += int(np.count_nonzero(known & (np.abs(z - p.points[p.nearest[i]]) < HIT)))
-        deep += int(np.count_nonzero(depth > DEEP))
-    return (close / both, deep / both) if both else (1.0, 0.0)
+        area += 0.5 * known.mean(axis=1) * other.area
+        both += known.sum(axis=1)
+        close += (known & (np.abs(z - p.points[p.nearest[at]]) < HIT)).sum(axis=1)
+        deep += (depth > DEEP).sum(axis=1)
+    some = np.maximum(both, 1)
+    return area, np.where(both > 0, close / some, 1.0), deep / some
 
 
 def _hits(p: WallPairs) -> NDArray[np.bool_]:
+    """Whether a wall point (k, m) is explained: a wall of the same direction within `HIT` across it."""
     r, along = p.across()
     same_way = (p.cosine() > 0.85) | (p.straight < 0.3)
-    return np.asarray(((np.abs(r) < HIT) & (np.abs(along) < 0.2) & same_way)[0])
+    return np.asarray((np.abs(r) < HIT) & (np.abs(along) < 0.2) & same_way)
 
 
 def quick_scores(pa: WallMap, pb: WallMap, t: Doubles, n: int) -> Floats:

@@ -12,13 +12,13 @@ import numpy as np
 
 from mapmeld.grid import OccupancyGrid
 from mapmeld.matching.correlative.alignment import refine, to_local, to_metric, turn_and_shift
-from mapmeld.matching.correlative.covariance import of_inverse
-from mapmeld.matching.correlative.evidence import HIT, Evidence, evidence, quick_scores
+from mapmeld.matching.correlative.covariance import of_inverse, transform_covariance
+from mapmeld.matching.correlative.evidence import HIT, Evidence, quick_scores, weigh
 from mapmeld.matching.correlative.parameters import CorrelativeParameters
+from mapmeld.matching.correlative.prepared_map import PreparedMap, prepare
 from mapmeld.matching.correlative.probability import ProbabilityModel, fitted_model
-from mapmeld.matching.correlative.reduced_map import reduce_map
 from mapmeld.matching.correlative.search import search
-from mapmeld.matching.correlative.wall_map import Doubles, WallMap, wall_map
+from mapmeld.matching.correlative.wall_map import Doubles, WallMap
 from mapmeld.matching.result import Alternative, MatchResult, Verdict
 from mapmeld.se2 import wrap_angle
 
@@ -26,6 +26,9 @@ COARSE_SCALES, COARSE_POINTS = (0.8, 0.6, 0.5, 0.4), 160
 FINE_SCALES, FINE_POINTS = (0.3, 0.25, 0.2, 0.15, 0.15), 600
 LOOKED_AT = 4  # transforms for which the full evidence is measured
 UNBENT_KEEPS = 0.8  # share of the walls explained as they lie that a transform found by bending must keep
+RIVAL_SCORE = 1.7  # P = 0.85 if the mode stood alone
+RIVAL_EXPLAINS = 0.95  # of the share of walls that the best mode explains
+RIVAL_CONTRADICTED = 0.01  # more, as a share of the walls, than in the best mode
 APART = 0.5  # [m] modes nearer than this (or than the maps bend) are one
 APART_TURNED = 0.09  # [rad]
 
@@ -58,19 +61,18 @@ def match_correlative(
     together, but none alone, are sure enough.
     """
     parameters = parameters or CorrelativeParameters()
-    walls_a, walls_b = wall_map(a), wall_map(b)
-    if walls_a is None or walls_b is None:
-        return _rejected(f"nothing to match on: map {'a' if walls_a is None else 'b'} has no obstacle")
-    if _comes_first(b, walls_b, a, walls_a):
-        return _inverted(_match(b, walls_b, a, walls_a, parameters))
-    return _match(a, walls_a, b, walls_b, parameters)
+    prepared_a, prepared_b = prepare(a), prepare(b)
+    if prepared_a is None or prepared_b is None:
+        return _rejected(f"nothing to match on: map {'a' if prepared_a is None else 'b'} has no obstacle")
+    if _comes_first(b, prepared_b.walls, a, prepared_a.walls):
+        return _inverted(_match(prepared_b, prepared_a, parameters))
+    return _match(prepared_a, prepared_b, parameters)
 
 
-def _match(
-    a: OccupancyGrid, walls_a: WallMap, b: OccupancyGrid, walls_b: WallMap, parameters: CorrelativeParameters
-) -> MatchResult:
+def _match(a: PreparedMap, b: PreparedMap, parameters: CorrelativeParameters) -> MatchResult:
     model = fitted_model()
-    hypotheses = search(reduce_map(a), reduce_map(b), parameters.hypotheses)
+    walls_a, walls_b = a.walls, b.walls
+    hypotheses = search(a.reduced, b.reduced, parameters.hypotheses)
     if not hypotheses:
         return _rejected("nothing to match on: the walls fit nowhere")
     transforms = np.array([to_local(walls_a, walls_b, h.T_a_b) for h in hypotheses])
@@ -78,7 +80,7 @@ def _match(
     transforms = transforms[_most_promising(walls_a, walls_b, transforms)]
     transforms = refine(walls_a, walls_b, transforms, FINE_SCALES, FINE_POINTS)
     modes = _distinct(walls_b, _weighed(walls_a, walls_b, transforms, model))
-    probabilities = model.probabilities([mode.score for mode in modes])
+    probabilities = model.probabilities(_level_rivals(modes))
     return _answer(walls_a, walls_b, modes, probabilities, parameters.accept_probability)
 
 
@@ -96,15 +98,15 @@ def _most_promising(walls_a: WallMap, walls_b: WallMap, transforms: Doubles) -> 
 def _weighed(walls_a: WallMap, walls_b: WallMap, transforms: Doubles, model: ProbabilityModel) -> list[Mode]:
     """Measure the evidence for each transform (k, 3); the best comes first."""
 
-    def weigh(local: Doubles) -> Mode:
-        found = evidence(walls_a, walls_b, local)
-        return Mode(local, found, model.score(found))
+    def weighed(transforms: Doubles) -> list[Mode]:
+        found = weigh(walls_a, walls_b, transforms)
+        return [Mode(local, e, model.score(e)) for local, e in zip(transforms, found, strict=True)]
 
-    modes = sorted(map(weigh, transforms), key=lambda mode: -mode.score)
+    modes = sorted(weighed(transforms), key=lambda mode: -mode.score)
     best = modes[0]
     if best.evidence.bend > HIT:
         # Narrow tolerances can lock onto one part of a bent map; the bending has seen all of it.
-        again = weigh(best.evidence.unbent)
+        (again,) = weighed(best.evidence.unbent[None])
         # Not at the price of walls that fitted as they lay: those are more exact than any bending.
         if again.score > best.score and again.evidence.hit >= UNBENT_KEEPS * best.evidence.hit:
             modes[0] = again
@@ -134,6 +136,27 @@ def _differ(walls_b: WallMap, s: Doubles, t: Doubles, metres: float, radians: fl
     return bool(abs(middle[0] - middle[1]) > metres)
 
 
+def _level_rivals(modes: Sequence[Mode]) -> list[float]:
+    """Return the modes' scores, those of rivals raised to the best's.
+
+    A rival could be accepted if it stood alone, and explains what it covers as well as the best does
+    what that covers. Then the best only covers more, which in a place that repeats itself says
+    nothing: the maps would fit equally well one room further on.
+    """
+    best = modes[0]
+    explained, contradicted = best.evidence.shares
+    scores = []
+    for mode in modes:
+        its_explained, its_contradicted = mode.evidence.shares
+        as_good = (
+            its_explained >= RIVAL_EXPLAINS * explained
+            and its_contradicted <= contradicted + RIVAL_CONTRADICTED
+        )
+        rival = mode.score > RIVAL_SCORE and as_good
+        scores.append(best.score if rival else min(mode.score, best.score))
+    return scores
+
+
 # ---------------------------------------------------------------------- the answer
 def _answer(
     walls_a: WallMap, walls_b: WallMap, modes: Sequence[Mode], probabilities: Doubles, accept: float
@@ -145,7 +168,7 @@ def _answer(
     )
     if probabilities[0] >= accept:
         verdict = Verdict.ACCEPTED
-    elif len(modes) > 1 and probabilities[:2].sum() >= accept:
+    elif probabilities.sum() >= accept:
         verdict = Verdict.AMBIGUOUS
         reason += "; another transform explains the maps about as well"
     else:
@@ -158,7 +181,7 @@ def _answer(
         probability=float(probabilities[0]),
         similarity=_similarity(walls_a, walls_b, best),
         overlap=min(1.0, best.overlap),
-        covariance=best.covariance,
+        covariance=transform_covariance(walls_a, walls_b, modes[0].local, best.bend),
         alternatives=tuple(
             Alternative(
                 to_metric(walls_a, walls_b, mode.local),

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmeld.grid import FREE_UP_TO, OCCUPIED, OCCUPIED_FROM, OccupancyGrid
 from mapmeld.matching.correlative.directions import SPECTRUM_BLUR, direction_spectrum, main_direction
+from mapmeld.matching.correlative.masks import Image, MapMasks
 from mapmeld.se2 import Pose2
-
-Image = NDArray[Any]  # bytes or float32; OpenCV's annotations say neither
 
 REDUCED_CELL = 0.2
 """Side of a raster cell [m], about: the nearest whole multiple of the map's own cells."""
@@ -60,24 +57,14 @@ class ReducedMap:
     area: float
 
 
-def reduce_map(grid: OccupancyGrid) -> ReducedMap:
-    """Reduce a map to what the search needs, in time linear in its cells."""
-    cells = grid.cells.view(np.uint8)
-    # Cut to the known cells first, so that unknown borders cannot change the answer.
-    left, bottom, width, height = (
-        cv2.boundingRect(cv2.inRange(cells, 0, OCCUPIED)) if cells.size else (0, 0, 0, 0)
-    )
-    if not width:
-        left = bottom = 0
-        width = height = 1
-        cells = np.full((1, 1), 255, np.uint8)
-    cells = np.ascontiguousarray(cells[bottom : bottom + height, left : left + width])
-    k = max(1, round(REDUCED_CELL / grid.resolution))
-    cell = grid.resolution * k
+def reduce_map(masks: MapMasks) -> ReducedMap:
+    """Reduce a map to what the search needs."""
+    k = max(1, round(REDUCED_CELL / masks.resolution))
+    cell = masks.resolution * k
     margin = math.ceil(4 * SPECTRUM_BLUR / cell)
-    covered = _with_border(pooled(cv2.inRange(cells, OCCUPIED_FROM, OCCUPIED), k), margin)
+    covered = _with_border(pooled(masks.wall, k), margin)
     wall = cv2.inRange(covered, 1, 255)
-    floor = _with_border(pooled(cv2.inRange(cells, 0, FREE_UP_TO), k), margin)
+    floor = _with_border(pooled(masks.floor, k), margin)
     floor[wall > 0] = 0
     known = cv2.max(wall, cv2.inRange(floor, 128, 255))
     spectrum = direction_spectrum(covered, cell)
@@ -85,15 +72,14 @@ def reduce_map(grid: OccupancyGrid) -> ReducedMap:
     at_row, at_col = np.nonzero(wall)
     points = (np.stack([at_col, at_row], axis=1).astype(np.float32) + np.float32(0.5)) * np.float32(cell)
     middle = _middle(points, main)
-    lattice = middle / grid.resolution - margin * k
-    x, y = grid.lattice_to_metres((left + lattice[0], bottom + lattice[1]))
+    x, y = masks.origin.apply(middle - margin * cell)
     return ReducedMap(
         cell=cell,
         wall=wall,
         floor=floor,
         known=known,
         middle=(float(middle[0] / cell), float(middle[1] / cell)),
-        T_map_mid=Pose2(float(x), float(y), grid.origin.theta),
+        T_map_mid=Pose2(float(x), float(y), masks.origin.theta),
         spectrum=spectrum,
         main_direction=main,
         points=points - middle,

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmeld.matching.correlative.directions import relative_directions
-from mapmeld.matching.correlative.reduced_map import Image, ReducedMap, pooled
+from mapmeld.matching.correlative.masks import Image
+from mapmeld.matching.correlative.reduced_map import ReducedMap, pooled
 from mapmeld.se2 import Pose2, wrap_angle
 
 Rows = NDArray[np.float64]

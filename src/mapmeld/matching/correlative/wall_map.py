@@ -9,13 +9,12 @@ the distance across a wall (real part) and along it (imaginary part) at once.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmeld.grid import FREE_UP_TO, OCCUPIED, OCCUPIED_FROM, OccupancyGrid
+from mapmeld.matching.correlative.masks import Image, MapMasks
 from mapmeld.se2 import Pose2
 
 Floats = NDArray[np.float32]
@@ -80,20 +79,14 @@ class WallMap:
         return np.asarray(r * cols + c)
 
 
-def wall_map(grid: OccupancyGrid) -> WallMap | None:
-    """Compute the fields and wall points of a map; None if it holds no wall."""
-    grid = grid.cropped()
-    cells = np.ascontiguousarray(grid.cells)
-    wall = cv2.inRange(cells, OCCUPIED_FROM, OCCUPIED)
-    free = cv2.inRange(cells, 0, FREE_UP_TO)
-    known = cv2.inRange(cells, 0, OCCUPIED)
-    if not cv2.countNonZero(wall):
-        return None
+def wall_map(masks: MapMasks) -> WallMap:
+    """Compute the fields and wall points of a map."""
+    wall = masks.wall
     spots = cv2.findNonZero(wall)
-    k = max(1, round(FIELD_CELL / grid.resolution))
+    k = max(1, round(FIELD_CELL / masks.resolution))
     while wall.size / k**2 > MAX_FIELD_CELLS:
         k += 1
-    cell = grid.resolution * k
+    cell = masks.resolution * k
     shape = (-(-wall.shape[0] // k) + 2 * BORDER, -(-wall.shape[1] // k) + 2 * BORDER)
     own, points, normals, straight = _wall_points(np.asarray(spots, np.int32).reshape(-1, 2), k, shape)
     n = len(own)
@@ -111,16 +104,16 @@ def wall_map(grid: OccupancyGrid) -> WallMap | None:
     of_label = np.zeros(n + 1, np.int32)
     of_label[labels[own]] = place
 
-    is_free = ((_share(free, k, shape) > 127) & (walls == 0)).view(np.uint8)
+    is_free = ((_share(masks.floor, k, shape) > 127) & (walls == 0)).view(np.uint8)
     depth = cv2.distanceTransform(is_free, cv2.DIST_L2, cv2.DIST_MASK_5) * np.float32(cell)
-    is_known = (_share(known, k, shape) > 127) | (walls > 0)
+    is_known = (_share(masks.known, k, shape) > 127) | (walls > 0)
     depth[~is_known] = -1
     floor = np.flatnonzero(is_known)
     step = max(1, len(floor) // FLOOR_SAMPLE)
     floor = floor[step // 2 :: step]
     floor_row, floor_col = np.divmod(floor, shape[1])
     return WallMap(
-        frame=grid.origin,
+        frame=masks.origin,
         cell=cell,
         shape=shape,
         depth=depth.ravel(),
@@ -130,7 +123,7 @@ def wall_map(grid: OccupancyGrid) -> WallMap | None:
         straight=straight[order].astype(np.float32),
         metres=cell,
         floor=((floor_col - BORDER + 0.5 + 1j * (floor_row - BORDER + 0.5)) * cell).astype(np.complex64),
-        area=cv2.countNonZero(known) * grid.resolution**2,
+        area=cv2.countNonZero(masks.known) * masks.resolution**2,
     )
 
 
@@ -182,7 +175,7 @@ def _wall_points(
     return own, corner + np.where(straight > 0.3, on_line, mine), along * 1j, straight
 
 
-def _share(mask: NDArray[Any], k: int, shape: tuple[int, int]) -> NDArray[Any]:
+def _share(mask: Image, k: int, shape: tuple[int, int]) -> Image:
     """Return the share of each k x k block where mask holds, 0..255, with the fields' border."""
     rows, cols = shape[0] - 2 * BORDER, shape[1] - 2 * BORDER
     if k > 1:
