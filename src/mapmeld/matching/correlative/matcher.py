@@ -27,6 +27,7 @@ FINE_SCALES, FINE_POINTS = (0.3, 0.25, 0.2, 0.15, 0.15), 600
 LOOKED_AT = 4  # transforms for which the full evidence is measured
 UNBENT_KEEPS = 0.8  # share of the walls explained as they lie that a transform found by bending must keep
 RIVAL_SCORE = 1.7  # P = 0.85 if the mode stood alone
+RIVAL_SCORE_SHARE = 0.5  # of the best mode's score: covering less, it has less to show
 RIVAL_EXPLAINS = 0.95  # of the share of walls that the best mode explains
 RIVAL_CONTRADICTED = 0.01  # more, as a share of the walls, than in the best mode
 APART = 0.5  # [m] modes nearer than this (or than the maps bend) are one
@@ -70,18 +71,23 @@ def match_correlative(
 
 
 def _match(a: PreparedMap, b: PreparedMap, parameters: CorrelativeParameters) -> MatchResult:
-    model = fitted_model()
-    walls_a, walls_b = a.walls, b.walls
+    modes = ranked_modes(a, b, parameters)
+    if not modes:
+        return _rejected("nothing to match on: the walls fit nowhere")
+    probabilities = fitted_model().probabilities(_level_rivals(modes))
+    return _answer(a.walls, b.walls, modes, probabilities, parameters.accept_probability)
+
+
+def ranked_modes(a: PreparedMap, b: PreparedMap, parameters: CorrelativeParameters) -> list[Mode]:
+    """Return the truly different ways to lay b on a, with the evidence for each, best first."""
     hypotheses = search(a.reduced, b.reduced, parameters.hypotheses)
     if not hypotheses:
-        return _rejected("nothing to match on: the walls fit nowhere")
-    transforms = np.array([to_local(walls_a, walls_b, h.T_a_b) for h in hypotheses])
-    transforms = refine(walls_a, walls_b, transforms, COARSE_SCALES, COARSE_POINTS)
-    transforms = transforms[_most_promising(walls_a, walls_b, transforms)]
-    transforms = refine(walls_a, walls_b, transforms, FINE_SCALES, FINE_POINTS)
-    modes = _distinct(walls_b, _weighed(walls_a, walls_b, transforms, model))
-    probabilities = model.probabilities(_level_rivals(modes))
-    return _answer(walls_a, walls_b, modes, probabilities, parameters.accept_probability)
+        return []
+    transforms = np.array([to_local(a.walls, b.walls, h.T_a_b) for h in hypotheses])
+    transforms = refine(a.walls, b.walls, transforms, COARSE_SCALES, COARSE_POINTS)
+    transforms = transforms[_most_promising(a.walls, b.walls, transforms)]
+    transforms = refine(a.walls, b.walls, transforms, FINE_SCALES, FINE_POINTS)
+    return _distinct(b.walls, _weighed(a.walls, b.walls, transforms, fitted_model()))
 
 
 def _most_promising(walls_a: WallMap, walls_b: WallMap, transforms: Doubles) -> list[int]:
@@ -152,7 +158,7 @@ def _level_rivals(modes: Sequence[Mode]) -> list[float]:
             its_explained >= RIVAL_EXPLAINS * explained
             and its_contradicted <= contradicted + RIVAL_CONTRADICTED
         )
-        rival = mode.score > RIVAL_SCORE and as_good
+        rival = as_good and mode.score > max(RIVAL_SCORE, RIVAL_SCORE_SHARE * best.score)
         scores.append(best.score if rival else min(mode.score, best.score))
     return scores
 
