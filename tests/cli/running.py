@@ -13,7 +13,7 @@ from pathlib import Path
 from drawing import office, seen_from
 from typer.testing import CliRunner
 
-from mapmeld.cli import app
+from mapmeld.cli.commands import app
 from mapmeld.grid import OccupancyGrid
 from mapmeld.io import save
 from mapmeld.se2 import Pose2

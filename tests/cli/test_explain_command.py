@@ -1,3 +1,4 @@
+import errno
 import json
 import re
 from importlib import import_module
@@ -37,8 +38,7 @@ def test_maps_that_do_not_match_are_explained_too(tmp_path: Path) -> None:
     a, empty = write_maps(tmp_path, "a", "empty")
     outcome = run("explain", a, empty, "-o", tmp_path / "out")
     assert outcome.code == 1
-    assert contents(tmp_path / "out") >= {*FIGURE_NAMES[:8], *DOCUMENTS}
-    assert "14_merged.png" not in contents(tmp_path / "out")
+    assert contents(tmp_path / "out") == {*FIGURE_NAMES[:8], *DOCUMENTS}
     assert "Rejected" in (tmp_path / "out" / "index.md").read_text()
 
 
@@ -59,9 +59,28 @@ def test_force_replaces_the_old_run_and_nothing_else(tmp_path: Path) -> None:
     assert run("explain", a, b, "-o", out).code == 0
     (out / "mine.txt").write_text("mine")
     assert run("explain", a, empty, "-o", out, "--force").code == 1
-    left = contents(out)
-    assert "mine.txt" in left
-    assert "14_merged.png" not in left  # of the first run
+    assert contents(out) == {*FIGURE_NAMES[:8], *DOCUMENTS, "mine.txt"}
+    # A third run, which stops elsewhere and so gives other numbers.
+    assert run("explain", a, b, "-o", out, "--force", "--set", "accept_similarity=0.99").code == 1
+    third = contents(out)
+    assert "14_overlay.png" in third
+    assert run("explain", a, b, "-o", out, "--force").code == 0
+    assert contents(out) == {*FIGURE_NAMES, *DOCUMENTS, "mine.txt"}
+
+
+def test_a_full_disk_names_the_folder_that_was_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    a, b = write_maps(tmp_path, "a", "b")
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("mapmeld.io.atomic._write", full)
+    outcome = run("explain", a, b, "-o", tmp_path / "out")
+    assert outcome.code == 2
+    assert outcome.line == f"mapmeld: {tmp_path}/out/01_maps.png: cannot be written: No space left on device"
+    assert {path.name for path in tmp_path.iterdir()} == {"a.yaml", "a.pgm", "b.yaml", "b.pgm"}
 
 
 def test_a_bad_map_leaves_no_trace(tmp_path: Path) -> None:

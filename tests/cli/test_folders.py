@@ -1,9 +1,11 @@
+import errno
 from pathlib import Path
 
 import pytest
 from running import contents
 
 from mapmeld.cli.folders import FolderError, check_folder, whole_folder
+from mapmeld.io import MapFileError
 
 
 def write(folder: Path, *, force: bool = False, ours: tuple[str, ...] = (), **files: str) -> None:
@@ -26,6 +28,37 @@ def write_while(folder: Path, other: str) -> None:
         (temporary / "a").write_text("1")
         folder.mkdir(exist_ok=True)
         (folder / other).write_text("mine")
+
+
+def full_disk(folder: Path, *, temporary_too: bool = True) -> None:
+    with whole_folder(folder, force=False, ours=()) as temporary:
+        path = temporary / "sub" / "a.png"
+        if temporary_too:
+            raise MapFileError.of(path, "cannot be written: No space left on device")
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+
+@pytest.mark.parametrize("exists", [False, True])
+def test_messages_name_the_folder_that_was_asked_for(
+    tmp_path: Path, exists: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    out = Path("out")
+    if exists:
+        out.mkdir()
+    with pytest.raises(FolderError) as caught:
+        full_disk(out)
+    assert str(caught.value) == "out/sub/a.png: cannot be written: No space left on device"
+    with pytest.raises(FolderError) as caught:
+        full_disk(out, temporary_too=False)
+    assert str(caught.value) == "out: cannot be written: No space left on device"
+
+
+def test_other_errors_pass_as_they_are(tmp_path: Path) -> None:
+    for error in (MapFileError("other: trouble"), OSError(errno.EPIPE, "Broken pipe")):
+        with pytest.raises(type(error)) as caught, whole_folder(tmp_path / "out", force=False, ours=()):
+            raise error
+        assert caught.value is error
 
 
 def test_a_new_folder_appears_whole(tmp_path: Path) -> None:

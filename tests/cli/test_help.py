@@ -6,8 +6,9 @@ import pytest
 from running import run, run_for_real
 
 import mapmeld
-from mapmeld.cli.options import Fusion, WriteMode
+from mapmeld.cli.options import DEFAULT_METHOD, Fusion, WriteMode
 from mapmeld.io import Mode
+from mapmeld.matching import DEFAULT_METHOD as THE_DEFAULT_METHOD
 from mapmeld.merging import FUSIONS
 
 COMMANDS = ("match", "merge", "show", "explain", "demo", "benchmark")
@@ -18,6 +19,14 @@ def test_help_names_every_command_and_the_exit_codes() -> None:
     assert outcome.code == 0
     assert all(command in outcome.out for command in COMMANDS)
     assert "Exit codes" in outcome.out
+    assert all(f"{code} " in outcome.out for code in (0, 1, 2, 70, 130, 141))
+
+
+@pytest.mark.parametrize("command", ["match", "merge", "show"])
+def test_help_names_the_default_method_and_the_way_to_its_settings(command: str) -> None:
+    words = " ".join(run(command, "--help").out.replace("│", " ").split())
+    assert f"[default: {DEFAULT_METHOD}]" in words
+    assert "'--set help'" in words
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -57,9 +66,12 @@ def test_without_a_command_there_is_help_and_exit_code_2(tmp_path: Path) -> None
         (["frobnicate"], "frobnicate"),
         (["--frobnicate"], "--frobnicate"),
         (["match", "a.yaml"], "'B'"),
-        (["match", "a.yaml", "b.yaml", "--resolution", "wide"], "--resolution"),
+        (["match", "a.yaml", "b.yaml", "--resolution", "wide"], "'--resolution': "),
+        (["match", "a.yaml", "b.yaml", "--resolution", "wide"], "'wide'"),
+        (["benchmark", "d", "--workers", "0"], "0"),
         (["merge", "a.yaml", "-o", "m.yaml"], "two maps"),
         (["merge", "a.yaml", "b.yaml"], "--out"),
+        (["merge", "a.yaml", "b.yaml", "-o", "m.yaml", "--fusion", "glue"], "'--fusion': 'glue'"),
         (["merge", "a.yaml", "b.yaml", "-o", "m.yaml", "--fusion", "glue"], "colour"),
         (["merge", "a.yaml", "b.yaml", "-o", "m.yaml", "--mode", "fancy"], "trinary"),
         (["show", "a.yaml", "-o", "p.png", "--transform", "1,2,3"], "second map"),
@@ -74,8 +86,11 @@ def test_wrong_usage_is_one_line_and_exit_code_2(
     assert outcome.out == ""
     assert said in outcome.line
     assert outcome.line.startswith("mapmeld: ")
+    # Phrases of the library that checks values, none of which is for users.
+    assert not any(phrase in outcome.line for phrase in ("Value error", "Input should", "parse"))
 
 
 def test_what_help_lists_is_what_there_is() -> None:
+    assert DEFAULT_METHOD == THE_DEFAULT_METHOD
     assert [str(f) for f in Fusion] == list(FUSIONS)
     assert [str(m) for m in WriteMode] == list(Mode.__args__)  # type: ignore[attr-defined]

@@ -8,6 +8,9 @@ from typing import Any
 import pytest
 from running import run, write_maps
 
+from mapmeld.matching import Alternative, MatchResult, Verdict
+from mapmeld.se2 import Pose2
+
 DOCUMENT = Path(__file__).parents[2] / "docs" / "json.md"
 
 
@@ -43,7 +46,31 @@ def test_the_document_lists_what_is_printed(tmp_path: Path, schema: str) -> None
     else:
         # One map joins, one is refused with a transform.
         maps = write_maps(tmp_path, "a", "b", "mirrored")
-        outcome = run("merge", *maps, "-o", tmp_path / "m.yaml", "--json", "--set", "accept_similarity=0.6")
+        outcome = run("merge", *maps, "-o", tmp_path / "m.yaml", "--json")
     printed = json.loads(outcome.out)
     assert printed["schema"] == schema
     assert in_short(paths(printed)) == in_short(documented(schema))
+
+
+def test_what_the_default_method_fills_in(tmp_path: Path) -> None:
+    printed = json.loads(run("match", *write_maps(tmp_path, "a", "b"), "--json").out)
+    assert printed["method"] == "correlative"
+    assert 0.99 < printed["probability"] <= 1
+    assert [len(row) for row in printed["covariance"]] == [3, 3, 3]
+    others = [other["probability"] for other in printed["alternatives"]]
+    assert others == sorted(others, reverse=True)
+    assert printed["probability"] + sum(others) <= 1 + 1e-9
+
+
+def test_an_ambiguous_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    second = Alternative(Pose2(4, 5, 6), 0.3, 0.41)
+    answer = MatchResult(Pose2(1, 2, 3), Verdict.AMBIGUOUS, "two", 0.5, alternatives=(second,))
+    monkeypatch.setattr("mapmeld.matching.match", lambda *_: answer)
+    outcome = run("match", *write_maps(tmp_path, "a", "b"), "--json")
+    assert outcome.code == 1
+    printed = json.loads(outcome.out)
+    assert printed["verdict"] == "ambiguous"
+    assert printed["covariance"] is None
+    assert printed["alternatives"] == [
+        {"T_a_b": {"x": 4, "y": 5, "theta": 6}, "similarity": 0.3, "probability": 0.41}
+    ]

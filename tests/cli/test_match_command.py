@@ -1,6 +1,7 @@
 import json
 import math
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -9,7 +10,8 @@ import numpy as np
 import pytest
 from running import T_A_B, run, run_for_real, write_maps
 
-from mapmeld.matching import METHODS, MatchResult, Verdict
+from mapmeld.cli.tables import probability_text
+from mapmeld.matching import METHODS, Alternative, MatchResult, Verdict
 from mapmeld.se2 import Pose2
 
 
@@ -20,11 +22,21 @@ def test_an_accepted_match(tmp_path: Path) -> None:
     assert outcome.err == ""
     rows = dict(line.split(maxsplit=1) for line in outcome.out.splitlines())
     assert rows["verdict"] == "accepted"
-    assert rows["probability"] == "-"
-    assert "Jaccard similarity" in rows["reason"]
+    assert rows["probability"] == "> 0.999"
+    assert "wall in the overlap" in rows["reason"]
+    assert re.fullmatch(r"dev +x 0\.0\d\d m, y 0\.0\d\d m, theta 0\.\d\d deg", rows["std"])
     x, y, theta = (float(rows["T_a_b"].split()[i]) for i in (1, 4, 7))
     assert math.hypot(x - T_A_B.x, y - T_A_B.y) < 0.2
     assert theta == pytest.approx(math.degrees(T_A_B.theta), abs=1)
+
+
+def test_a_method_without_calibration(tmp_path: Path) -> None:
+    outcome = run("match", *write_maps(tmp_path, "a", "b"), "--method", "alphabet")
+    assert outcome.code == 0
+    rows = dict(line.split(maxsplit=1) for line in outcome.out.splitlines())
+    assert rows["probability"] == "-"
+    assert "Jaccard similarity" in rows["reason"]
+    assert "std" not in rows
 
 
 def test_nothing_to_match_on_is_an_answer_not_an_error(tmp_path: Path) -> None:
@@ -40,14 +52,14 @@ def test_nothing_to_match_on_is_an_answer_not_an_error(tmp_path: Path) -> None:
 
 def test_json_is_all_of_stdout(tmp_path: Path) -> None:
     a, b = write_maps(tmp_path, "a", "b")
-    outcome = run_for_real("match", a.name, b.name, "--json", "--set", "corners=40", cwd=tmp_path)
+    outcome = run_for_real("match", a.name, b.name, "--json", "--set", "hypotheses=10", cwd=tmp_path)
     assert outcome.code == 0
     assert outcome.err == ""
     parsed = json.loads(outcome.out)
     assert parsed["schema"] == "mapmeld.match/1"
     assert parsed["maps"] == {"a": "a.yaml", "b": "b.yaml"}
     assert parsed["verdict"] == "accepted"
-    assert parsed["parameters"]["corners"] == 40
+    assert parsed["parameters"]["hypotheses"] == 10
     found = Pose2(**parsed["T_a_b"])
     assert found.distance_to(T_A_B)[0] < 0.2
     assert found.distance_to(T_A_B)[1] < math.radians(1)
@@ -56,15 +68,34 @@ def test_json_is_all_of_stdout(tmp_path: Path) -> None:
 def test_covariance_and_probability_are_passed_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     a, b = write_maps(tmp_path, "a", "b")
     answer = MatchResult(
-        Pose2(1, 2, 3), Verdict.AMBIGUOUS, "two ways", 0.5, 0.4, 0.3, np.diag([1.0, 2.0, 3.0])
+        Pose2(1, 2, 3),
+        Verdict.AMBIGUOUS,
+        "two ways",
+        0.5,
+        0.4,
+        0.3,
+        np.diag([1.0, 4.0, math.radians(3) ** 2]),
+        (Alternative(Pose2(4, 5, 0), 0.3, 0.41),),
     )
     monkeypatch.setattr("mapmeld.matching.match", lambda *_: answer)
     outcome = run("match", a, b, "--json")
     assert outcome.code == 1
     parsed = json.loads(outcome.out)
     assert parsed["probability"] == 0.5
-    assert parsed["covariance"] == [[1, 0, 0], [0, 2, 0], [0, 0, 3]]
-    assert "0.500" in run("match", a, b).out
+    assert parsed["covariance"] == [[1, 0, 0], [0, 4, 0], [0, 0, math.radians(3) ** 2]]
+    table = re.sub(" +", " ", run("match", a, b).out)
+    assert "\nstd dev x 1.000 m, y 2.000 m, theta 3.00 deg\n" in table
+    assert "\nprobability 0.500\n" in table
+    assert "\nor x 4.000 m, y 5.000 m, theta 0.00 deg; probability 0.410\n" in table
+
+
+@pytest.mark.parametrize(
+    ("probability", "text"),
+    [(None, "-"), (0.0, "0.000"), (1e-9, "< 0.001"), (0.0005, "0.001"), (0.998, "0.998"),
+     (0.9994, "0.999"), (0.99951, "> 0.999"), (1.0, "1.000")],
+)  # fmt: skip
+def test_probabilities_do_not_look_like_certainty(probability: float | None, text: str) -> None:
+    assert probability_text(probability) == text
 
 
 @pytest.mark.parametrize("text", ["resolution: nan", "- 1", "!!python/object:os.system {}", "\0", ""])
@@ -113,6 +144,8 @@ def test_resolutions_that_cannot_both_be_right_are_one_line(tmp_path: Path) -> N
         assert outcome.code == 2
         assert outcome.out == ""
         assert "check the resolutions" in outcome.line
+        assert str(a) in outcome.line
+        assert str(b) in outcome.line
     assert not (tmp_path / "m.yaml").exists()
 
 
@@ -120,9 +153,12 @@ def test_settings_reach_the_method(tmp_path: Path) -> None:
     maps = write_maps(tmp_path, "a", "b")
     strict = tmp_path / "strict.yaml"
     strict.write_text("accept_similarity: 0.99\n")
-    assert run("match", *maps, "--params", strict).code == 1
+    command = ["match", *maps, "--method", "alphabet", "--params", strict]
+    assert run(*command).code == 1
     # What is set on the command line wins over the file.
-    assert run("match", *maps, "--params", strict, "--set", "accept_similarity=0.1").code == 0
+    assert run(*command, "--set", "accept_similarity=0.1").code == 0
+    sure = "accept_probability=0.9999999999999"
+    assert run("match", *maps, "--set", sure).code == 1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="file names of any bytes are a matter of Linux")
@@ -136,20 +172,24 @@ def test_names_that_are_no_text_can_be_printed(tmp_path: Path) -> None:
     assert json.loads(run_for_real("match", a, b, "--json", cwd=tmp_path).out)["verdict"] == "accepted"
 
 
-def test_a_closed_pipe_is_no_traceback(tmp_path: Path) -> None:
-    a, b = write_maps(tmp_path, "a", "b")
-    read, write = os.pipe()
-    os.close(read)
-    import subprocess
+@pytest.mark.skipif(sys.platform == "win32", reason="such file names are not to be had on Windows")
+def test_a_name_with_a_line_end_does_not_break_the_table(tmp_path: Path) -> None:
+    folder = tmp_path / "two\nlines \x1b[31m"
+    folder.mkdir()
+    a, b = write_maps(folder, "a", "b")
+    outcome = run("match", a, b)
+    assert "two\\nlines \\x1b[31m" in outcome.out
+    assert "\x1b" not in outcome.out
+    names = [line.split()[0] for line in outcome.out.splitlines()]
+    assert names[:3] == ["a", "b", "T_a_b"]
+    assert run("show", a, "-o", tmp_path / "p\nq.png").out == f"Written: {tmp_path}/p\\nq.png\n"
 
-    with os.fdopen(write, "wb") as stdout:
-        done = subprocess.run(
-            [sys.executable, "-m", "mapmeld", "match", a, b, "--json"],
-            stdout=stdout,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-    assert "Traceback" not in done.stderr
+
+def test_a_folder_is_no_map(tmp_path: Path) -> None:
+    (a,) = write_maps(tmp_path, "a")
+    outcome = run("match", a, tmp_path)
+    assert outcome.code == 2
+    assert "is a folder" in outcome.line
 
 
 def test_opencv_speaks_no_word(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import pytest
 from running import T_A_B, contents, run, run_for_real, write_maps
 
 import mapmeld
+from mapmeld.report.palette import BLUE, ORANGE
 from mapmeld.se2 import Pose2
 
 
@@ -133,3 +134,34 @@ def test_maps_that_fit_one_another_but_not_the_first(tmp_path: Path) -> None:
     outcome = run("merge", *maps, "-o", tmp_path / "m.yaml")
     assert outcome.code == 1
     assert "These fit one another, but not map 1: a.yaml, b.yaml" in outcome.out
+
+
+def test_a_map_given_twice_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    a, b = write_maps(tmp_path, "a", "b")
+    (tmp_path / "link.yaml").symlink_to(a)
+    monkeypatch.chdir(tmp_path)
+    outcome = run("merge", a, b, "./a.yaml", "link.yaml", "-o", "m.yaml")
+    assert outcome.code == 0
+    assert outcome.line == f"mapmeld: note: maps 1, 3 and 4 are the same file, {a}; it counts 3 times"
+    outcome = run("merge", b, a, b, "-o", "m2.yaml", "--json")
+    assert "maps 1 and 3 are the same file" in outcome.line
+    assert "counts twice" in outcome.line
+    assert json.loads(outcome.out)["complete"] is True
+
+
+def test_the_table_of_a_merge_says_how_sure_it_is(tmp_path: Path) -> None:
+    maps = write_maps(tmp_path, "a", "b")
+    lines = run("merge", *maps, "-o", tmp_path / "m.yaml").out.splitlines()
+    assert lines[1].split()[-2:] == ["similarity", "probability"]
+    assert "> 0.999" in lines[3]
+    lines = run("merge", *maps, "-o", tmp_path / "m2.yaml", "--method", "alphabet").out.splitlines()
+    assert lines[3].split()[-2:] == ["-", "joined"]
+
+
+def test_a_map_keeps_its_colour_when_one_before_it_is_left_out(tmp_path: Path) -> None:
+    maps = write_maps(tmp_path, "a", "empty", "b")
+    run("merge", *maps, "-o", tmp_path / "m.yaml", "--overlay", tmp_path / "o.png", "--partial")
+    picture = cv2.imread(str(tmp_path / "o.png"))
+    assert picture is not None
+    assert (picture == ORANGE).all(axis=2).any()
+    assert not (picture == BLUE).all(axis=2).any()

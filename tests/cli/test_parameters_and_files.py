@@ -1,4 +1,4 @@
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
@@ -43,8 +43,17 @@ def test_the_file_changes_defaults_and_set_changes_the_file(tmp_path: Path) -> N
 
 
 def test_an_empty_file_changes_nothing(tmp_path: Path) -> None:
-    (tmp_path / "p.yaml").write_text("# nothing\n")
-    assert effective_parameters("alphabet", tmp_path / "p.yaml", []) == AlphabetParameters()
+    for text in ("# nothing\n", "", "---\n"):
+        (tmp_path / "p.yaml").write_text(text)
+        assert effective_parameters("alphabet", tmp_path / "p.yaml", []) == AlphabetParameters()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_setting_without_a_value_lists_them_all(method: str) -> None:
+    with pytest.raises(ParametersError) as caught:
+        effective_parameters(method, None, ["help"])
+    for key, value in asdict(METHODS[method].parameters()).items():
+        assert f"{key}={value}" in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -75,15 +84,29 @@ def test_a_bad_setting_is_explained(setting: str, said: str) -> None:
         ("cornrs: 3", "corners"),
         ("corners: 3.0", "whole number"),
         ("corners: true", "whole number"),
-        ("corners: [3]", "whole number"),
+        ("corners: [3]", "values in one another"),
+        ("corners: {a: 3}", "values in one another"),
+        ("corners: " + "9" * 5000, "corners must be a whole number, not '9{37}...'$"),
+        ("corners: " + "9" * 300, "corners must be in .*9\\.\\.\\.$"),
+        ("corners: " + "9" * 3000, "settings of method alphabet"),
+        ("corners: " + "[" * 20_000, "values in one another in line 1"),
+        ("[" * 20_000, "key: value"),
+        ("corners:\n" + "- " * 20_000, "values in one another in line 2"),
+        ("a: &a [x, x]\nb: &b [*a, *a]\nc: [*b, *b]\n", "anchor or alias in line 1"),
+        ("corners: *x", "anchor or alias in line 1"),
+        ("corners: 3\ncorners: 4", "gives 'corners' twice"),
+        ("# " + "x" * 70_000, "is too large for a file of settings"),
+        ("x" * 500 + ": 3", "no setting 'x{37}...'; there are"),
         ("corner_quality:", "a number"),
-        ("- corners", "setting: value"),
-        ("3", "setting: value"),
-        ("corners: [", "not valid YAML"),
-        ("corners: !!python/object/apply:os.getcwd []", "not valid YAML"),
-        ("corners: 2024-02-31", "not valid YAML"),
+        ("- corners", "key: value"),
+        ("3", "key: value"),
+        ("corners: [", "values in one another"),
+        ("corners: 'a", "not valid YAML"),
+        ("corners: !!python/object/apply:os.getcwd []", "uses the YAML tag"),
+        ("corners: 2024-02-31", "whole number, not '2024-02-31'"),
+        ("corner_quality: .nan", "finite"),
         ("3: 4", "no setting '3'"),
-        ("[1, 2]: 4", "YAML|no setting"),
+        ("[1, 2]: 4", "values in one another"),
         ("corners: \x00", "not valid YAML"),
     ],
 )
@@ -92,12 +115,14 @@ def test_a_bad_file_is_named_and_explained(tmp_path: Path, text: str, said: str)
     file.write_text(text)
     with pytest.raises(ParametersError, match=said) as caught:
         effective_parameters("alphabet", file, None)
-    assert "p.yaml" in str(caught.value)
+    assert "p.yaml" in str(caught.value) or "settings of method" in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 500
 
 
-@pytest.mark.parametrize("name", ["missing.yaml", "."])
-def test_a_file_that_cannot_be_read(tmp_path: Path, name: str) -> None:
-    with pytest.raises(ParametersError, match="cannot be read"):
+@pytest.mark.parametrize(("name", "said"), [("missing.yaml", "no such file"), (".", "is a folder")])
+def test_a_file_that_cannot_be_read(tmp_path: Path, name: str, said: str) -> None:
+    with pytest.raises(ParametersError, match=said):
         effective_parameters("alphabet", tmp_path / name, None)
 
 
@@ -122,12 +147,18 @@ def test_a_file_that_is_no_text(tmp_path: Path) -> None:
         ("maybe=none", "maybe", None),
         ("maybe=0.5", "maybe", 0.5),
         ("choice=right", "choice", "right"),
+        ("number=.inf", "number", float("inf")),
+        ("number=-.INF", "number", float("-inf")),
+        ("maybe=~", "maybe", None),
+        ("flag=on", "flag", True),
     ],
 )
-def test_values_by_kind(setting: str, key: str, value: object) -> None:
-    got = getattr(effective_parameters("invented", None, [setting]), key)
-    assert got == value
-    assert type(got) is type(value)
+def test_values_by_kind(setting: str, key: str, value: object, tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text(f"{key}: {setting.partition('=')[2]}\n")
+    for file, settings in ((None, [setting]), (tmp_path / "p.yaml", None)):
+        got = getattr(effective_parameters("invented", file, settings), key)
+        assert got == value
+        assert type(got) is type(value)
 
 
 @pytest.mark.usefixtures("_invented")

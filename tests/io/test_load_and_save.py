@@ -13,7 +13,7 @@ from image_files import pgm
 import mapmeld
 from mapmeld import io
 from mapmeld.grid import OccupancyGrid
-from mapmeld.io import FORMATS, MapFileError, load, save
+from mapmeld.io import FORMATS, MapFileError, load, printable, save
 from mapmeld.se2 import Pose2
 
 GRID = OccupancyGrid(np.array([[-1, 0, 100], [0, 0, 100]], np.int8), 0.05, Pose2(1.0, -2.0, 0.3))
@@ -108,3 +108,12 @@ def test_messages_stay_on_one_line_whatever_the_name(tmp_path: Path) -> None:
 
 def test_names_in_other_letters_stay_legible() -> None:
     assert str(MapFileError.of("étage-二.yaml", "no")) == "étage-二.yaml: no"
+
+
+def test_a_folder_is_called_a_folder(tmp_path: Path) -> None:
+    with pytest.raises(MapFileError, match=f"^{tmp_path}: is a folder"):
+        load(tmp_path)
+
+
+def test_what_does_not_print_is_escaped() -> None:
+    assert printable("a\nb\x1b[31m\udce9 é") == "a\\nb\\x1b[31m\\udce9 é"

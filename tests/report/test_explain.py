@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mapmeld.grid import FREE, UNKNOWN, OccupancyGrid
 from mapmeld.matching import Verdict
 from mapmeld.matching.alphabet import AlphabetParameters
-from mapmeld.report import FIGURE_NAMES, Explanation, explain
+from mapmeld.report import FIGURE_NAMES, POSSIBLE_NAMES, Explanation, explain
 from mapmeld.report.palette import BLUE, GREEN, RED
 from mapmeld.se2 import Pose2
 
@@ -23,6 +23,13 @@ def accepted() -> Explanation:
 
 def names(explanation: Explanation) -> list[str]:
     return [figure.name for figure in explanation.figures]
+
+
+def check_numbers(explanation: Explanation) -> None:
+    """One after the other, and no name that a later run with other maps would not clean away."""
+    for n, name in enumerate(names(explanation), start=1):
+        assert name.startswith(f"{n:02}_")
+        assert name in POSSIBLE_NAMES
 
 
 def figure(explanation: Explanation, start: str) -> NDArray[np.uint8]:
@@ -43,11 +50,11 @@ def test_every_step_has_its_picture(accepted: Explanation) -> None:
 def test_captions_carry_the_figures(accepted: Explanation) -> None:
     captions = {one.name[:2]: one.caption for one in accepted.figures}
     assert f"{accepted.result.similarity:.3f}" in captions["12"]
-    assert re.search(r"turn of -40\.\d degrees", captions["09"])
+    assert re.search(r"turn of the pixels by -40\.\d degrees, in direction", captions["09"])
     assert str(accepted.result.T_a_b) in captions["14"]
 
 
-def test_the_overlay_is_mostly_green_and_the_references_are_blue_and_red(accepted: Explanation) -> None:
+def test_the_overlay_is_mostly_green_and_the_references_are_red_and_blue(accepted: Explanation) -> None:
     def count(start: str, colour: tuple[int, int, int]) -> int:
         return int((figure(accepted, start) == colour).all(axis=2).sum())
 
@@ -67,7 +74,7 @@ def test_a_rejected_pair_is_explained_but_not_merged() -> None:
     parameters = AlphabetParameters(accept_similarity=1.0)
     explanation = explain(office(), seen_from(office(), T_B_A), parameters)
     assert explanation.result.verdict is Verdict.REJECTED
-    assert names(explanation) == [n for n in FIGURE_NAMES if n != "14_merged.png"]
+    assert names(explanation) == [*FIGURE_NAMES[:13], "14_overlay.png"]
     assert "rejected, so not merged" in explanation.figures[-1].caption
 
 
@@ -85,8 +92,35 @@ def test_nothing_to_match_on(b: OccupancyGrid) -> None:
     explanation = explain(office(), b)
     assert explanation.result.T_a_b is None
     assert names(explanation)[:8] == list(FIGURE_NAMES[:8])
-    assert "14_merged.png" not in names(explanation)
-    assert "15_overlay.png" not in names(explanation)
+    check_numbers(explanation)
+    assert not any("merged" in name or "overlay" in name for name in names(explanation))
+
+
+def test_no_candidate_leaves_no_gap_in_the_numbers() -> None:
+    explanation = explain(office(), seen_from(office(), T_B_A), AlphabetParameters(relation_min_px=1e6))
+    check_numbers(explanation)
+    assert names(explanation)[8:] == ["09_gamma.png"]
+
+
+def test_lattices_with_a_yaw_have_both_turns_named() -> None:
+    a = OccupancyGrid(office().cells, 0.05, Pose2(-3, 2, math.radians(10)))
+    b = seen_from(office(), T_B_A)
+    b = OccupancyGrid(b.cells, 0.05, Pose2(1, 1, math.radians(-100)))
+    explanation = explain(a, b)
+    T_a_b = explanation.result.T_a_b
+    assert T_a_b is not None
+    captions = {one.name[3:]: one.caption for one in explanation.figures}
+    for name in ("first_letters.png", "second_letters.png"):
+        found = re.search(
+            r"turn of the pixels by (\S+) degrees \(theta (\S+) degrees between the frames, in which "
+            r"the pixels of a are turned by 10\.0 and those of b by -100\.0 degrees\)",
+            captions[name],
+        )
+        assert found is not None, captions[name]
+        assert float(found[1]) == pytest.approx(-40, abs=1)
+        assert float(found[2]) == pytest.approx(math.degrees(T_a_b.theta), abs=1)
+    for name in ("merged.png", "overlay.png"):
+        assert captions[name].endswith("turned by 10.0 degrees in the map's frame.")
 
 
 def test_maps_of_different_resolution_are_shown_at_the_coarser_one() -> None:

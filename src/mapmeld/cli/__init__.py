@@ -1,65 +1,54 @@
-"""The command line: one thin file per command, and here what ties them together.
+"""The command line: one thin file per command; `mapmeld.cli.commands` ties them together.
 
-Nothing imported here imports NumPy or OpenCV, so that ``mapmeld --help`` is quick; each command
-imports what it needs when it runs.
+This file alone runs before anything large is imported, so that whatever happens later, even in an
+import, ends with the exit code that it should.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
+import os
 import sys
-from typing import Annotated
+import traceback
 
-import typer
+from mapmeld.cli.errors import BAD_INPUT, FAULT, INTERRUPTED, say, silence
 
-from mapmeld import __version__
-from mapmeld.cli.benchmark import benchmark
-from mapmeld.cli.demo import demo
-from mapmeld.cli.errors import Commands
-from mapmeld.cli.explain import explain
-from mapmeld.cli.match import match
-from mapmeld.cli.merge import merge
-from mapmeld.cli.show import show
-
-__all__ = ["app", "main"]
-
-app = typer.Typer(
-    cls=Commands,
-    help="Find how occupancy grid maps fit together, say how sure that is, and merge them.",
-    epilog="Exit codes: 0 matched (all maps joined), 1 no acceptable match, 2 bad input or usage.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-
-
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(f"mapmeld {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _options(
-    version: Annotated[
-        bool,
-        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
-    ] = False,
-) -> None:
-    pass
-
-
-for _command in (match, merge, show, explain, demo, benchmark):
-    app.command()(_command)
+__all__ = ["main"]
 
 
 def main() -> None:
     """Run the command line on ``sys.argv`` and exit."""
+    if sys.stderr is None:  # closed: what is not wanted shall disturb nobody
+        sys.stderr = open(os.devnull, "w")  # noqa: PTH123, SIM115  (until the end)
+    if sys.stdout is None:
+        # Worse than useless: the next file to be opened would take its place.
+        say("standard output is closed; if it is not wanted, send it to /dev/null")
+        sys.exit(BAD_INPUT)
+    if isinstance(sys.stdout.buffer, io.RawIOBase):
+        # `python -u` keeps nothing of what could not be written; to tell an error of stdout, something must.
+        encoding = sys.stdout.encoding
+        sys.stdout = io.TextIOWrapper(io.BufferedWriter(sys.stdout.detach()), encoding)
     for stream in (sys.stdout, sys.stderr):
         # File names may hold bytes that are no text; to print them must not fail.
         if isinstance(stream, io.TextIOWrapper):
             with contextlib.suppress(ValueError):
                 stream.reconfigure(errors="backslashreplace")
-    app(prog_name="mapmeld")
+    try:
+        from mapmeld.cli.commands import app
+
+        code = app(prog_name="mapmeld", standalone_mode=False)
+    except KeyboardInterrupt:
+        say("interrupted")
+        code = INTERRUPTED
+    except Exception:
+        # Python's own exit code for this is 1, which here means that maps do not match.
+        with contextlib.suppress(Exception):
+            traceback.print_exc()
+        code = FAULT
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            silence(stream)
+    sys.exit(code)

@@ -18,28 +18,27 @@ _MAPS = ("robot_1.yaml", "robot_2.yaml")
 
 
 def demo(out: FolderOut = Path("mapmeld-demo"), force: Force = False) -> None:
-    """Match and merge two maps that come with mapmeld, and explain how, in pictures."""
+    """Match and merge two maps that come with mapmeld, and show the paper's method in pictures."""
     from mapmeld.cli.example_maps import example_map
     from mapmeld.cli.explain import DOCUMENTS, write_explanation
     from mapmeld.cli.folders import check_folder, whole_folder
     from mapmeld.cli.maps import load_maps
-    from mapmeld.cli.parameters import effective_parameters
     from mapmeld.cli.progress import working
     from mapmeld.cli.tables import pose_text, print_lines, print_match
     from mapmeld.io import save
+    from mapmeld.matching.alphabet import AlphabetParameters
     from mapmeld.merging import merge
-    from mapmeld.report import FIGURE_NAMES, explain, overlay, references, write_picture
+    from mapmeld.report import POSSIBLE_NAMES, explain, overlay, references, write_picture
 
     check_folder(out, force=force)
     paths = [str(example_map(name)) for name in _MAPS]
-    parameters = effective_parameters("alphabet", None, None)
-    pages = [f"explain/{name}" for name in (*FIGURE_NAMES, *DOCUMENTS)]
+    pages = [f"explain/{name}" for name in (*POSSIBLE_NAMES, *DOCUMENTS)]
     ours = ["merged.yaml", "merged.pgm", "overlay.png", "references.png", *pages]
     with working("Matching, merging and drawing"):
         a, b = load_maps(paths, None)
-        merged = merge([a, b], parameters=parameters)
+        merged = merge([a, b])
+        parameters = AlphabetParameters()
         explanation = explain(a, b, parameters, _MAPS)
-        result = explanation.result
         T_1_2 = merged.poses[1]
         if T_1_2 is not None:
             with whole_folder(out, force=force, ours=ours) as folder:
@@ -52,7 +51,7 @@ def demo(out: FolderOut = Path("mapmeld-demo"), force: Force = False) -> None:
                 (folder / "explain").mkdir()
                 write_explanation(explanation, parameters, paths, folder / "explain")
     print_lines("Two simulated robots mapped parts of one office floor, each from its own start.", "")
-    print_match(result, paths)
+    print_match(merged.joints[0].result if merged.joints else merged.refused[1], paths)
     if T_1_2 is None:
         print_lines("", "The maps could not be joined; nothing written.")
         raise typer.Exit(NO_MATCH)
@@ -70,7 +69,8 @@ def demo(out: FolderOut = Path("mapmeld-demo"), force: Force = False) -> None:
         "  merged.yaml, merged.pgm  the merged map, as ROS map_server and nav2 read it",
         "  references.png           the merged map and where each robot started",
         "  overlay.png              robot 1 red, robot 2 blue, walls that both saw green",
-        f"  explain/index.md         how it was found, step by step, in {len(explanation.figures)} pictures",
+        "  explain/index.md         how the paper's method, alphabet, goes about it, step by step,",
+        f"                           in {len(explanation.figures)} pictures",
         "",
         "With maps of your own:  mapmeld merge A.yaml B.yaml -o merged.yaml",
     )

@@ -1,65 +1,36 @@
-"""Known errors become one line on stderr and an exit code; unknown ones keep their traceback."""
+"""Exit codes and the one line on stderr.
+
+Imports next to nothing: it must work from the first moment on.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
-from collections.abc import Sequence
-from typing import Any
+from typing import TextIO
 
-import typer
-from typer.core import TyperGroup
-
-from mapmeld.errors import MapmeldError
+from mapmeld.io import printable
 
 NO_MATCH = 1
 BAD_INPUT = 2
-INTERRUPTED = 130  # as shells count it: 128 + SIGINT
-
-# The class that all complaints about the command line derive from, under the name by which it can be
-# reached in every release of Typer.
-_UsageError: type[Any] = typer.BadParameter.__mro__[1]
+FAULT = 70  # EX_SOFTWARE of BSD's sysexits.h
+# As shells count them: 128 and the number of the signal.
+INTERRUPTED = 130
+CLOSED_PIPE = 141
 
 
 def say(message: str) -> None:
-    """Print one line on stderr."""
-    typer.echo(f"mapmeld: {' '.join(message.split())}", err=True)
+    """Print one line on stderr, if that takes it."""
+    try:
+        print(f"mapmeld: {printable(' '.join(message.split()))}", file=sys.stderr, flush=True)
+    except OSError:  # the exit code still says it
+        silence(sys.stderr)
 
 
-class Commands(TyperGroup):
-    """The group of commands, with one place for what goes wrong in any of them."""
-
-    def invoke(self, ctx: Any) -> Any:
-        """Run the command that was asked for."""
-        try:
-            return super().invoke(ctx)
-        except MapmeldError as error:
-            say(str(error))
-            raise typer.Exit(BAD_INPUT) from error
-        except KeyboardInterrupt as error:
-            say("interrupted, nothing more is written")
-            raise typer.Exit(INTERRUPTED) from error
-
-    def main(
-        self,
-        args: Sequence[str] | None = None,
-        prog_name: str | None = None,
-        complete_var: str | None = None,
-        standalone_mode: bool = True,
-        windows_expand_args: bool = True,
-        **extra: Any,
-    ) -> Any:
-        """Parse the command line and run it; usage errors are one line too."""
-        try:
-            code = super().main(args, prog_name, complete_var, False, windows_expand_args, **extra)
-        except _UsageError as error:
-            if type(error).__name__ == "NoArgsIsHelpError":  # carries the whole help instead of a line
-                error.show()
-            else:
-                command = error.ctx.command_path if error.ctx else "mapmeld"
-                say(f"{error.format_message().rstrip('.')} (see {command} --help)")
-            code = BAD_INPUT
-        except (typer.Abort, KeyboardInterrupt):
-            code = INTERRUPTED
-        if not standalone_mode:
-            return code
-        sys.exit(code if isinstance(code, int) else 0)
+def silence(stream: TextIO) -> None:
+    """Let a stream that takes nothing more lose what it still holds; Python would fail on it at its end."""
+    with contextlib.suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)

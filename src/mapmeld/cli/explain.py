@@ -28,9 +28,10 @@ def explain(
     settings: Settings = None,
     resolution: Resolution = None,
 ) -> None:
-    """Match two maps by the paper's method and write a picture of every step of it.
+    """Match two maps by the paper's method, alphabet, and write a picture of every step of it.
 
-    The folder is written even if the maps do not match: it shows where the method failed.
+    The other commands use another method unless told otherwise. The folder is written even if the maps
+    do not match: it shows where the method failed.
     """
     from mapmeld.cli.folders import check_folder, whole_folder
     from mapmeld.cli.maps import load_maps, names_of
@@ -38,7 +39,7 @@ def explain(
     from mapmeld.cli.progress import working
     from mapmeld.cli.tables import print_lines, print_match
     from mapmeld.matching import Verdict
-    from mapmeld.report import FIGURE_NAMES
+    from mapmeld.report import POSSIBLE_NAMES
     from mapmeld.report import explain as explain_maps
 
     check_folder(out, force=force)
@@ -47,7 +48,7 @@ def explain(
         name_a, name_b = names_of([a, b])
         grid_a, grid_b = load_maps([a, b], resolution)
         explanation = explain_maps(grid_a, grid_b, parameters, (name_a, name_b))
-        with whole_folder(out, force=force, ours=(*FIGURE_NAMES, *DOCUMENTS)) as folder:
+        with whole_folder(out, force=force, ours=(*POSSIBLE_NAMES, *DOCUMENTS)) as folder:
             write_explanation(explanation, parameters, [a, b], folder)
     print_match(explanation.result, [a, b])
     print_lines("", f"Written: {out} ({len(explanation.figures)} pictures; begin with index.md)")
@@ -79,10 +80,11 @@ def write_explanation(explanation: Explanation, parameters: Any, paths: Sequence
 def _page(explanation: Explanation, names: Sequence[str]) -> str:
     from mapmeld import __version__
     from mapmeld.cli.tables import pose_text
+    from mapmeld.io import printable
 
     result = explanation.result
     lines = [
-        f"# `{names[0]}` (a) and `{names[1]}` (b)",
+        f"# `{printable(names[0])}` (a) and `{printable(names[1])}` (b)",
         "",
         f"**{str(result.verdict).capitalize()}**: {result.reason}.",
         "",

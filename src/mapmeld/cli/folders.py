@@ -58,16 +58,29 @@ def whole_folder(folder: Path, *, force: bool, ours: Collection[str]) -> Iterato
     """
     check_folder(folder, force=force)
     # Beside a new folder, inside one that exists: always on the same file system.
-    parent = folder if folder.is_dir() else folder.absolute().parent
-    temporary = parent / f".mapmeld-{secrets.token_hex(8)}.tmp"
+    name = f".mapmeld-{secrets.token_hex(8)}.tmp"
+    exists = folder.is_dir()
+    temporary = folder / name if exists else folder.with_name(name)
     try:
         try:
             temporary.mkdir()
         except OSError as error:
             raise FolderError(f"{folder}: cannot be written: {error.strerror}") from error
-        yield temporary
         try:
-            if parent == folder:
+            yield temporary
+        # The temporary folder is nothing that the user knows of.
+        except MapmeldError as error:
+            problem = str(error)
+            if name not in problem:
+                raise
+            named = problem.replace(f"{name}{os.sep}", "") if exists else problem.replace(name, folder.name)
+            raise FolderError(named) from error
+        except OSError as error:
+            if name not in str(error.filename):
+                raise
+            raise FolderError(f"{folder}: cannot be written: {error.strerror}") from error
+        try:
+            if exists:
                 _move_into(temporary, folder, force, ours)
             else:
                 temporary.rename(folder)

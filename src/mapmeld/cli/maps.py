@@ -16,17 +16,28 @@ def load_maps(paths: Sequence[str], resolution: float | None) -> list[OccupancyG
     Raises
     ------
     MapFileError
-        A map cannot be read, or a resolution is given though no map needs one.
+        A map cannot be read, a resolution is given though no map needs one, or two maps have
+        cells of such different sizes that one of them must be wrong.
     """
+    from mapmeld.grid import MAX_RATIO
     from mapmeld.io import FORMATS, MapFileError, load
 
     bare = [Path(path).suffix.lower() in FORMATS["image"].suffixes for path in paths]
     if resolution is not None and not any(bare):
         raise MapFileError("--resolution is for bare images; these maps state their own")
-    return [
+    grids = [
         load(path, resolution=resolution if is_bare else None)
         for path, is_bare in zip(paths, bare, strict=True)
     ]
+    for path, grid in zip(paths, grids, strict=True):
+        cells = (grids[0].resolution, grid.resolution)
+        if max(cells) > MAX_RATIO * min(cells):
+            raise MapFileError.of(
+                path,
+                f"has cells of {cells[1]:g} m, {paths[0]} of {cells[0]:g} m, which differ by more than a factor "
+                f"of {MAX_RATIO}; check the resolutions",
+            )
+    return grids
 
 
 def names_of(paths: Sequence[str]) -> list[str]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import typer
 
 from mapmeld.cli.errors import NO_MATCH
-from mapmeld.cli.options import Json, MapA, MapB, Method, ParamsFile, Resolution, Settings
+from mapmeld.cli.options import DEFAULT_METHOD, Json, MapA, MapB, Method, ParamsFile, Resolution, Settings
 
 
 def match(
     a: MapA,
     b: MapB,
     json: Json = False,
-    method: Method = "alphabet",
+    method: Method = DEFAULT_METHOD,
     params: ParamsFile = None,
     settings: Settings = None,
     resolution: Resolution = None,

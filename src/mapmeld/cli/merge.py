@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,7 +10,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mapmeld.cli.errors import NO_MATCH, say
-from mapmeld.cli.options import Force, Fusion, Json, Method, ParamsFile, Resolution, Settings, WriteMode
+from mapmeld.cli.options import (
+    DEFAULT_METHOD,
+    Force,
+    Fusion,
+    Json,
+    Method,
+    ParamsFile,
+    Resolution,
+    Settings,
+    WriteMode,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,7 +51,7 @@ def merge(
     ] = None,
     force: Force = False,
     json: Json = False,
-    method: Method = "alphabet",
+    method: Method = DEFAULT_METHOD,
     params: ParamsFile = None,
     settings: Settings = None,
     resolution: Resolution = None,
@@ -57,6 +68,7 @@ def merge(
     if len(maps) < 2:
         raise typer.BadParameter("two maps or more are needed", param_hint="MAP")
     _check_outputs(out, mode, overlay, force)
+    _note_repeated(maps)
     parameters = effective_parameters(method, params, settings)
     started = time.perf_counter()
     with working(f"Matching and merging {len(maps)} maps"):
@@ -84,6 +96,20 @@ def merge(
         say(f"note: {out} keeps only free, occupied and unknown; --mode scale keeps the percentages")
     if not result.complete:
         raise typer.Exit(NO_MATCH)
+
+
+def _note_repeated(maps: Sequence[str]) -> None:
+    """Say of every file that was given more than once that it counts as often."""
+    numbers: dict[str, list[int]] = {}
+    for number, path in enumerate(maps, start=1):
+        numbers.setdefault(os.path.realpath(path), []).append(number)
+    for same in numbers.values():
+        if len(same) > 1:
+            times = "twice" if len(same) == 2 else f"{len(same)} times"
+            which = ", ".join(map(str, same[:-1]))
+            say(
+                f"note: maps {which} and {same[-1]} are the same file, {maps[same[0] - 1]}; it counts {times}"
+            )
 
 
 def _check_outputs(out: Path, mode: WriteMode, overlay: Path | None, force: bool) -> None:
@@ -128,7 +154,5 @@ def _write(
 def _overlay(result: MergeResult, grids: Sequence[OccupancyGrid], names: Sequence[str]) -> Picture:
     from mapmeld.report import overlay
 
-    joined = [i for i, pose in enumerate(result.poses) if pose is not None]
-    poses = [pose for pose in result.poses if pose is not None]
-    caption = f"{len(joined)} maps in the frame of {names[0]}."
-    return overlay([grids[i] for i in joined], poses, [names[i] for i in joined], caption)
+    joined = sum(pose is not None for pose in result.poses)
+    return overlay(grids, result.poses, names, f"{joined} maps in the frame of {names[0]}.")

@@ -8,6 +8,9 @@ from typing import Annotated
 
 import typer
 
+DEFAULT_METHOD = "correlative"
+"""That of `mapmeld.matching`, named here so that help need not import it."""
+
 # Texts, not Paths: later formats put more than a file name into them.
 MapA = Annotated[
     str, typer.Argument(metavar="A", help="A map: YAML file of map_server or nav2, or a bare image.")
@@ -23,7 +26,11 @@ ParamsFile = Annotated[
 ]
 Settings = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="One setting of the method; may be repeated."),
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="One setting of the method; may be repeated. '--set help' lists all there are.",
+    ),
 ]
 Resolution = Annotated[
     float | None,

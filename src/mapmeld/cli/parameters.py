@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import types
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
@@ -10,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from mapmeld.errors import MapmeldError
+from mapmeld.io import MapFileError
+from mapmeld.io.plain_yaml import Scalar, read_fields, short
 
 if TYPE_CHECKING:
     from mapmeld.matching import Method
@@ -34,12 +37,14 @@ def effective_parameters(method: str, file: Path | None, settings: Sequence[str]
 
     chosen = method_named(method)
     given = {} if file is None else _checked(_read(file), chosen, method, f"{file}: ")
-    given |= _checked(_split(settings or ()), chosen, method, "--set: ")
+    given |= _checked(_split(settings or (), chosen, method), chosen, method, "--set: ")
     try:
         return chosen.parameters(**given)
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:  # the latter for whole numbers beyond any float
         # Known only once all are together, so it could have come from either.
-        raise ParametersError(f"settings of method {method}: {error}") from error
+        problem = str(error)
+        problem = problem if len(problem) <= 200 else problem[:197] + "..."  # it may quote the value
+        raise ParametersError(f"settings of method {method}: {problem}") from error
 
 
 def parameters_as_yaml(method: str, parameters: Any, version: str) -> str:
@@ -50,56 +55,49 @@ def parameters_as_yaml(method: str, parameters: Any, version: str) -> str:
     return f"# Settings of method {method}, mapmeld {version}; read by --params\n{settings}"
 
 
-def _split(settings: Sequence[str]) -> dict[str, object]:
-    given: dict[str, object] = {}
+def _split(settings: Sequence[str], chosen: Method, method: str) -> dict[str, str]:
+    given: dict[str, str] = {}
     for setting in settings:
         key, equals, value = setting.partition("=")
         if not (key.strip() and equals):
-            raise ParametersError(f"--set needs KEY=VALUE, not {setting!r}")
+            defaults = ", ".join(f"{key}={value}" for key, value in asdict(chosen.parameters()).items())
+            raise ParametersError(
+                f"--set needs KEY=VALUE, not {short(setting)}; method {method} has, by default, {defaults}"
+            )
         given[key.strip()] = value.strip()
     return given
 
 
-def _read(file: Path) -> Mapping[object, object]:
-    import yaml
-
+def _read(file: Path) -> dict[str, str]:
+    """Return the settings in a file as texts, which is how --set gives them."""
     try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ParametersError(f"{file}: cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise ParametersError(f"{file}: is not a text file in UTF-8") from error
-    except (yaml.YAMLError, ValueError) as error:  # ValueError: a date that does not exist
-        mark = getattr(error, "problem_mark", None)
-        where = f" (line {mark.line + 1})" if mark else ""
-        raise ParametersError(
-            f"{file}: is not valid YAML{where}: {getattr(error, 'problem', None) or error}"
-        ) from error
-    if content is None:
-        return {}
-    if not isinstance(content, dict):
-        raise ParametersError(f"{file}: must hold lines of 'setting: value'")
-    return content
+        found = read_fields(file, "a file of settings", depth=1, may_be_empty=True)
+    except MapFileError as error:
+        raise ParametersError(str(error)) from error
+    return {key: value.value for key, value in found.items() if isinstance(value, Scalar)}
 
 
-def _checked(given: Mapping[Any, object], chosen: Method, method: str, source: str) -> dict[str, object]:
+def _checked(given: Mapping[str, str], chosen: Method, method: str, source: str) -> dict[str, object]:
     known = get_type_hints(chosen.parameters)
     names = [field.name for field in fields(chosen.parameters)]
     values: dict[str, object] = {}
     for key, value in given.items():
         if key not in names:
-            near = difflib.get_close_matches(str(key), names, n=3, cutoff=0.5)
+            near = difflib.get_close_matches(key[:100], names, n=3, cutoff=0.5)
             hint = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(names)}"
-            raise ParametersError(f"{source}method {method} has no setting {str(key)!r}; {hint}")
+            raise ParametersError(f"{source}method {method} has no setting {short(key)}; {hint}")
         try:
             values[key] = _converted(value, known[key])
         except ValueError as error:
-            raise ParametersError(f"{source}{key} must be {error}, not {value!r}") from None
+            raise ParametersError(f"{source}{key} must be {error}, not {short(value)}") from None
     return values
 
 
-def _converted(value: object, kind: Any) -> object:
-    """Return the value as `kind`; a text is read as one.
+_FLAGS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
+
+
+def _converted(text: str, kind: Any) -> object:
+    """Return what a text says as `kind`.
 
     Raises
     ------
@@ -108,48 +106,38 @@ def _converted(value: object, kind: Any) -> object:
     """
     origin = get_origin(kind)
     if origin in (Union, types.UnionType):
-        return _first_that_fits(value, get_args(kind))
+        return _first_that_fits(text, get_args(kind))
     if origin is Literal:
-        if value in get_args(kind):
-            return value
+        for choice in get_args(kind):
+            if text == str(choice):
+                return choice
         raise ValueError("one of " + ", ".join(map(str, get_args(kind))))
-    text = value.strip().lower() if isinstance(value, str) else None
+    word = text.strip().lower()
     if kind is type(None):
-        if value is None or text in ("none", "null", ""):
+        if word in ("none", "null", "~", ""):
             return None
         raise ValueError("none")
     if kind is bool:
-        if isinstance(value, bool):
-            return value
-        if text in ("true", "false", "yes", "no"):
-            return text in ("true", "yes")
+        if word in _FLAGS:
+            return _FLAGS[word]
         raise ValueError("true or false")
     if kind is str:
-        if isinstance(value, str):
-            return value
-        raise ValueError("a text")
+        return text
     if kind in (int, float):
-        return _number(value, kind)
+        try:
+            # YAML writes .inf and .nan.
+            return kind(re.sub(r"^([-+]?)\.(?=inf$|nan$)", r"\1", word))
+        except (ValueError, OverflowError):
+            raise ValueError("a whole number" if kind is int else "a number") from None
     raise ValueError("set from Python")
 
 
-def _number(value: object, kind: type[int] | type[float]) -> int | float:
-    name = "a whole number" if kind is int else "a number"
-    fits = (int, str) if kind is int else (int, float, str)
-    if isinstance(value, bool) or not isinstance(value, fits):
-        raise ValueError(name)
-    try:
-        return kind(value)
-    except (ValueError, OverflowError):
-        raise ValueError(name) from None
-
-
-def _first_that_fits(value: object, kinds: Sequence[Any]) -> object:
+def _first_that_fits(text: str, kinds: Sequence[Any]) -> object:
     problems = []
     # None first: an empty text is no number, but may be none.
     for kind in sorted(kinds, key=lambda k: k is not type(None)):
         try:
-            return _converted(value, kind)
+            return _converted(text, kind)
         except ValueError as error:
             problems.append(str(error))
     raise ValueError(" or ".join(problems))

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mapmeld.cli.errors import NO_MATCH, say
-from mapmeld.cli.options import Force, MapA, Method, ParamsFile, PictureOut, Resolution, Settings
+from mapmeld.cli.options import (
+    DEFAULT_METHOD,
+    Force,
+    MapA,
+    Method,
+    ParamsFile,
+    PictureOut,
+    Resolution,
+    Settings,
+)
 
 if TYPE_CHECKING:
     from mapmeld.grid import OccupancyGrid
@@ -25,7 +34,7 @@ def show(
         typer.Option(metavar="X,Y,DEG", help="How B lies on A: metres, degrees. If not given, B is matched."),
     ] = None,
     force: Force = False,
-    method: Method = "alphabet",
+    method: Method = DEFAULT_METHOD,
     params: ParamsFile = None,
     settings: Settings = None,
     resolution: Resolution = None,
@@ -86,11 +95,12 @@ def _read_transform(text: str) -> Pose2:
 
 
 def _single(grid: OccupancyGrid, name: str) -> Picture:
-    from mapmeld.report import Panel, compose, paint_map
+    from mapmeld.report import Panel, compose, paint_map, with_turn
 
     canvas = paint_map(grid)
     rows, cols = grid.shape
     caption = (
         f"{name}: {cols} x {rows} cells of {grid.resolution:g} m, {grid.known_area:.1f} square metres known."
     )
+    caption = with_turn(caption, grid)
     return compose([Panel(canvas.picture)], caption, (), canvas.px_per_cell / grid.resolution)

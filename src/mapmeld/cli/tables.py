@@ -12,8 +12,13 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from mapmeld.io import printable
+
 if TYPE_CHECKING:
     from pathlib import Path
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from mapmeld.matching import MatchResult
     from mapmeld.merging import MergeResult
@@ -40,11 +45,30 @@ def pose_text(pose: Pose2 | None) -> str:
     return f"x {x} m, y {y} m, theta {rounded(math.degrees(pose.theta), 2)} deg"
 
 
+def probability_text(probability: float | None) -> str:
+    """Return a probability with three digits, which never look like certainty where there is none."""
+    if probability is None:
+        return "-"
+    if 0.9995 <= probability < 1:
+        return "> 0.999"
+    if 0 < probability < 0.0005:
+        return "< 0.001"
+    return rounded(probability, 3)
+
+
+def deviations_text(covariance: NDArray[np.float64] | None) -> str | None:
+    """Return the standard deviations of x, y and theta that a covariance (3, 3) gives; None of None."""
+    if covariance is None:
+        return None
+    x, y, theta = (math.sqrt(max(float(covariance[i, i]), 0.0)) for i in range(3))
+    return f"x {rounded(x, 3)} m, y {rounded(y, 3)} m, theta {rounded(math.degrees(theta), 2)} deg"
+
+
 def print_lines(*lines: str) -> None:
-    """Print lines as they are: names may hold brackets, and nothing is broken or coloured."""
+    """Print every line on one: names may hold brackets or line ends, and nothing is broken or coloured."""
     out = console()
     for line in lines:
-        out.print(Text(line), soft_wrap=True)
+        out.print(Text(printable(line)), soft_wrap=True)
 
 
 def _print_table(table: Table) -> None:
@@ -61,19 +85,22 @@ def print_match(result: MatchResult, names: Sequence[str]) -> None:
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
     verdict = str(result.verdict)
-    probability = "-" if result.probability is None else rounded(result.probability, 3)
-    for label, value in (
-        ("a", Text(names[0])),
-        ("b", Text(names[1])),
-        ("T_a_b", Text(pose_text(result.T_a_b), style="bold")),
-        ("verdict", Text(verdict, style=_COLOUR_OF.get(verdict, ""))),
-        ("reason", Text(result.reason)),
-        ("similarity", Text(rounded(result.similarity, 3))),
-        ("overlap", Text(rounded(result.overlap, 3))),
-        ("probability", Text(probability)),
-        ("seconds", Text(rounded(result.seconds, 3))),
-    ):
-        table.add_row(label, value)
+    deviations = deviations_text(result.covariance)
+    second = result.alternatives[0] if result.alternatives else None
+    table.add_row("a", Text(printable(names[0])))
+    table.add_row("b", Text(printable(names[1])))
+    table.add_row("T_a_b", Text(pose_text(result.T_a_b), style="bold"))
+    if deviations is not None:
+        table.add_row("std dev", Text(deviations))
+    table.add_row("verdict", Text(verdict, style=_COLOUR_OF.get(verdict, "")))
+    table.add_row("reason", Text(result.reason))
+    table.add_row("probability", Text(probability_text(result.probability)))
+    if verdict == "ambiguous" and second is not None:
+        sure = "" if second.probability is None else f"; probability {probability_text(second.probability)}"
+        table.add_row("or", Text(pose_text(second.T_a_b) + sure))
+    table.add_row("similarity", Text(rounded(result.similarity, 3)))
+    table.add_row("overlap", Text(rounded(result.overlap, 3)))
+    table.add_row("seconds", Text(rounded(result.seconds, 3)))
     _print_table(table)
 
 
@@ -82,17 +109,20 @@ def print_merge(result: MergeResult, names: Sequence[str]) -> None:
     table = Table(box=None, padding=(0, 2, 0, 0), header_style="dim", pad_edge=False)
     table.add_column("", justify="right")
     table.add_column("map", overflow="fold")
-    for heading in ("x [m]", "y [m]", "theta [deg]", "similarity"):
+    for heading in ("x [m]", "y [m]", "theta [deg]", "similarity", "probability"):
         table.add_column(Text(heading), justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
-    similarity = {joint.index: joint.result.similarity for joint in result.joints}
+    names = [printable(name) for name in names]
+    evidence = {joint.index: joint.result for joint in result.joints}
     for i, (name, pose) in enumerate(zip(names, result.poses, strict=True)):
         numbers = ["-"] * 3 if pose is None else _numbers(pose)
         state = Text("the reference") if i == 0 else Text("joined", style="green")
         if pose is None:
             state = Text("not joined", style="bold red")
-        shown = rounded(similarity[i], 3) if i in similarity else "-"
-        table.add_row(str(i + 1), Text(name), *numbers, shown, state)
+        shown = ["-", "-"]
+        if i in evidence:
+            shown = [rounded(evidence[i].similarity, 3), probability_text(evidence[i].probability)]
+        table.add_row(str(i + 1), Text(name), *numbers, *shown, state)
     out = console()
     out.print(Text("Transforms T_1_i: each map's frame in the frame of map 1", style="bold"))
     _print_table(table)

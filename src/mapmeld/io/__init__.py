@@ -33,7 +33,7 @@ class MapFileError(MapmeldError):
 
 
 def printable(text: str) -> str:
-    """Return a text on one line, with escapes (``\\n``, ``\\x1b``) for what would not show as it is."""
+    """Return a text on one line, with backslash escapes for what would not show as it is."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 

@@ -238,8 +238,8 @@ def _problem_of_origin(origin: Pose2, resolution: float) -> str | None:
     """Return what is wrong with an origin for cells of that size [m]; None if nothing is."""
     if math.ulp(max(abs(origin.x), abs(origin.y))) > resolution / 1000:
         return (
-            f"origin [{origin.x}, {origin.y}, {origin.theta}] is too far from zero for cells of {resolution} m:"
-            " numbers of that size cannot tell the cells apart"
+            f"origin [{origin.x}, {origin.y}, {origin.theta}] is too far from zero for cells of "
+            f"{resolution} m: numbers of that size cannot tell the cells apart"
         )
     if abs(origin.theta) > MAX_ORIGIN_YAW:
         return f"origin has a yaw of {origin.theta} rad, beyond the {MAX_ORIGIN_YAW:,.0f} that are taken"

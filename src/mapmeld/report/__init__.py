@@ -4,8 +4,8 @@ Everything here returns pictures, uint8 (height, width, 3), blue-green-red as Op
 the top; only `write_picture` touches a file.
 """
 
-from mapmeld.report.canvas import Canvas, Picture, Window, paint, paint_map
-from mapmeld.report.explain import FIGURE_NAMES, Explanation, Figure, explain
+from mapmeld.report.canvas import Canvas, Picture, Window, paint, paint_map, with_turn
+from mapmeld.report.explain import FIGURE_NAMES, POSSIBLE_NAMES, Explanation, Figure, explain
 from mapmeld.report.overlay import overlay
 from mapmeld.report.png import PictureError, check_picture_path, write_picture
 from mapmeld.report.references import references
@@ -13,6 +13,7 @@ from mapmeld.report.sheet import Panel, compose
 
 __all__ = [
     "FIGURE_NAMES",
+    "POSSIBLE_NAMES",
     "Canvas",
     "Explanation",
     "Figure",
@@ -27,5 +28,6 @@ __all__ = [
     "paint",
     "paint_map",
     "references",
+    "with_turn",
     "write_picture",
 ]

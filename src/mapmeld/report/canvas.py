@@ -6,6 +6,7 @@ and row 0 at the bottom, pictures have row 0 at the top.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mapmeld.grid import Mask, OccupancyGrid
 from mapmeld.report.palette import FLOOR_WHITE, UNKNOWN_GREY, WALL_BLACK, Colour
+from mapmeld.se2 import wrap_angle
 
 Picture = NDArray[np.uint8]
 """(height, width, 3), row 0 at the top, blue-green-red."""
@@ -173,6 +175,18 @@ def grey_labels(grid: OccupancyGrid) -> Labels:
 def paint_map(grid: OccupancyGrid, window: Window | None = None, px_per_cell: float | None = None) -> Canvas:
     """Paint a map in the paper's greys, by default its known part and a small margin."""
     return paint(grey_labels(grid), GREYS, window or known_window(grid), px_per_cell)
+
+
+def with_turn(caption: str, grid: OccupancyGrid) -> str:
+    """Return the caption of a picture of `grid`; if its lattice has a yaw, with a sentence about that.
+
+    Pictures lie along the cells, so that coordinates of a turned lattice cannot be read off them.
+    """
+    degrees = round(math.degrees(wrap_angle(grid.origin.theta)), 1)
+    if degrees == 0:
+        return caption
+    note = f"The picture lies along the cells, which are turned by {degrees:.1f} degrees in the map's frame."
+    return f"{caption} {note}".strip()
 
 
 def known_window(grid: OccupancyGrid) -> Window:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +22,17 @@ from mapmeld.matching.alphabet import (
 )
 from mapmeld.matching.alphabet.preprocessing import BLACK, WHITE, Image
 from mapmeld.merging import merge_aligned
-from mapmeld.report.canvas import GREYS, Canvas, Labels, Picture, Window, grey_labels, paint, whole_scale
+from mapmeld.report.canvas import (
+    GREYS,
+    Canvas,
+    Labels,
+    Picture,
+    Window,
+    grey_labels,
+    paint,
+    whole_scale,
+    with_turn,
+)
 from mapmeld.report.heatmap import with_gamma
 from mapmeld.report.marks import with_dots, with_labels
 from mapmeld.report.overlay import overlay
@@ -41,7 +51,7 @@ from mapmeld.report.palette import (
 from mapmeld.report.references import references
 from mapmeld.report.sheet import Panel, compose
 from mapmeld.report.stars import common_relations, with_star
-from mapmeld.se2 import Pose2
+from mapmeld.se2 import Pose2, wrap_angle
 
 _PANEL_PX = 800  # long side of one map where two are shown together
 
@@ -62,7 +72,16 @@ FIGURE_NAMES = (
     "14_merged.png",
     "15_overlay.png",
 )
-"""Every file name that `explain` may give, in order."""
+"""The file names that `explain` gives for an accepted match, in order."""
+
+_ALWAYS = 8  # pictures that show the way to the corners, which no pair of maps stops on
+
+POSSIBLE_NAMES = tuple(
+    f"{number:02}_{name[3:]}"
+    for position, name in enumerate(FIGURE_NAMES, start=1)
+    for number in range(min(position, _ALWAYS + 1), position + 1)
+)
+"""Every file name that `explain` may give: where steps are missing, the later ones count on without them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +91,7 @@ class Figure:
     Attributes
     ----------
     name
-        File name, which begins with the number of the step.
+        File name, which begins with the number of the picture.
     picture
         Blue-green-red, row 0 at the top.
     caption
@@ -94,7 +113,7 @@ class Explanation:
         The answer.
     figures
         The steps in order. Those that the method did not reach (no corners, no candidate) are
-        missing, and so is the merged map unless the match was accepted.
+        missing, and so is the merged map unless the match was accepted; the numbers have no gaps.
     """
 
     result: MatchResult
@@ -128,7 +147,11 @@ def explain(
         *_fitting(pair, matching),
         *_answer((a, b), names, result),
     ]
-    return Explanation(result, tuple(figures))
+    numbered = (
+        replace(figure, name=f"{number:02}_{figure.name[3:]}")
+        for number, figure in enumerate(figures, start=1)
+    )
+    return Explanation(result, tuple(numbered))
 
 
 # ---------------------------------------------------------------------- two maps at one scale
@@ -306,10 +329,23 @@ def _letters(
     caption = (
         f"Letter {i + 1} of a and letter {z + 1} of b, the {which} matching point of the best fitting: of "
         f"their {relations[0]} and {relations[1]} relations, {len(common)} agree in length and, after the "
-        f"turn of {math.degrees(T_1_2_px.theta):.1f} degrees, in direction (gamma {matching.gamma[i, z]})."
+        f"turn of the pixels by {_turn(T_1_2_px, pair.maps)}, in direction (gamma {matching.gamma[i, z]})."
     )
     legend = [(PAIR_COLOURS[0], "agrees, each in its own colour"), (FAINT, "has no partner")]
     return pair.figure(name, canvases, caption, legend)
+
+
+def _turn(T_1_2_px: Pose2, maps: tuple[OccupancyGrid, OccupancyGrid]) -> str:
+    """Name the turn between two lattices and, where one of them has a yaw, that between the frames."""
+    pixels = f"{math.degrees(T_1_2_px.theta):.1f} degrees"
+    yaws = [math.degrees(wrap_angle(grid.origin.theta)) for grid in maps]
+    if all(round(yaw, 1) == 0 for yaw in yaws):
+        return pixels
+    theta = wrap_angle(maps[0].origin.theta + T_1_2_px.theta - maps[1].origin.theta)
+    return (
+        f"{pixels} (theta {math.degrees(theta):.1f} degrees between the frames, in which the pixels of a are "
+        f"turned by {yaws[0]:.1f} and those of b by {yaws[1]:.1f} degrees)"
+    )
 
 
 def _relations(alphabet: Alphabet, letter: int) -> int:
@@ -360,12 +396,12 @@ def _answer(
             f"b lies at {result.T_a_b}."
         )
         picture = references(merge_aligned(maps, poses), poses, names, caption)
-        figures.append(Figure("14_merged.png", picture, caption))
+        figures.append(Figure("14_merged.png", picture, with_turn(caption, maps[0])))
         caption = (
             "Map b laid over map a under the transform that was found; walls agree where they are green."
         )
     else:
         caption = f"The best guess, {result.verdict}, so not merged: {result.T_a_b}."
     picture = overlay(maps, poses, [f"a: {names[0]}", f"b: {names[1]}"], caption)
-    figures.append(Figure("15_overlay.png", picture, caption))
+    figures.append(Figure("15_overlay.png", picture, with_turn(caption, maps[0])))
     return figures

@@ -9,8 +9,8 @@ import numpy as np
 
 from mapmeld.grid import Cells, OccupancyGrid, resample
 from mapmeld.merging import merge_aligned
-from mapmeld.report.canvas import Labels, Picture, known_window, paint
-from mapmeld.report.palette import FLOOR_WHITE, GREEN, OVERLAY_COLOURS, UNKNOWN_GREY, Colour
+from mapmeld.report.canvas import Labels, Picture, known_window, paint, with_turn
+from mapmeld.report.palette import FLOOR_WHITE, GREEN, UNKNOWN_GREY, Colour, colour_of_map
 from mapmeld.report.sheet import Panel, compose
 from mapmeld.se2 import Pose2
 
@@ -44,31 +44,38 @@ def overlay_labels(layers: Sequence[Cells]) -> Labels:
 
 
 def overlay(
-    grids: Sequence[OccupancyGrid], poses: Sequence[Pose2], names: Sequence[str], caption: str = ""
+    grids: Sequence[OccupancyGrid],
+    poses: Sequence[Pose2 | None],
+    names: Sequence[str],
+    caption: str = "",
 ) -> Picture:
     """Draw maps over one another, on the lattice of the first as in a merge.
 
     Parameters
     ----------
     grids, poses
-        As for `mapmeld.merging.merge_aligned`: ``T_first_i`` per map, the first the identity.
+        As for `mapmeld.merging.merge_aligned`: ``T_first_i`` per map, the first the identity. Maps
+        whose pose is None are left out; the others keep their colours.
     names
         What to call the maps in the legend.
     caption
-        A sentence below the picture.
+        A sentence below the picture; where the first map's lattice has a yaw, one about that is added.
 
     Returns
     -------
     Picture: map 1 red, map 2 blue, walls that two or more maps share (within one cell) green,
     floor white, unknown grey.
     """
-    lattice = merge_aligned(grids, poses)
-    layers = [resample(grid, T, lattice) for grid, T in zip(grids, poses, strict=True)]
-    colours: list[Colour] = [OVERLAY_COLOURS[i % len(OVERLAY_COLOURS)] for i in range(len(grids))]
+    placed = [(i, grid, T) for i, (grid, T) in enumerate(zip(grids, poses, strict=True)) if T is not None]
+    lattice = merge_aligned([grid for _, grid, _ in placed], [T for _, _, T in placed])
+    layers = [resample(grid, T, lattice) for _, grid, T in placed]
+    colours: list[Colour] = [colour_of_map(i) for i, _, _ in placed]
     canvas = paint(
         overlay_labels(layers), [UNKNOWN_GREY, FLOOR_WHITE, *colours, GREEN], known_window(lattice)
     )
-    legend = [*zip(colours, names, strict=True)]
-    if len(grids) > 1:
-        legend.append((GREEN, "walls in both" if len(grids) == 2 else "walls in two or more"))
-    return compose([Panel(canvas.picture)], caption, legend, canvas.px_per_cell / lattice.resolution)
+    legend = [(colour_of_map(i), names[i]) for i, _, _ in placed]
+    if len(placed) > 1:
+        legend.append((GREEN, "walls in both" if len(placed) == 2 else "walls in two or more"))
+    return compose(
+        [Panel(canvas.picture)], with_turn(caption, lattice), legend, canvas.px_per_cell / lattice.resolution
+    )

@@ -26,10 +26,9 @@ PAPER: Colour = (250, 250, 250)
 INK: Colour = (40, 40, 40)
 FRAME: Colour = (170, 170, 170)
 
-# Figure 8: map 1 red, map 2 blue; green is kept for what maps share.
-OVERLAY_COLOURS: tuple[Colour, ...] = (RED, BLUE, ORANGE, PURPLE, TEAL, BROWN, PINK)
-# Figure 7: robot 1 blue, robot 2 red.
-ROBOT_COLOURS: tuple[Colour, ...] = (BLUE, RED, GREEN, ORANGE, PURPLE, TEAL, BROWN, PINK)
+# One per map or robot, the same in every picture: 1 red, 2 blue, as in Figure 8 (Figure 7 has them the
+# other way round). Green is kept for what maps share.
+MAP_COLOURS: tuple[Colour, ...] = (RED, BLUE, ORANGE, PURPLE, TEAL, BROWN, PINK)
 # Told apart at a glance, for relations that belong together in two pictures.
 PAIR_COLOURS: tuple[Colour, ...] = (RED, BLUE, GREEN, ORANGE, PURPLE, TEAL, BROWN, PINK)
 
@@ -40,3 +39,8 @@ def heat_palette() -> NDArray[np.uint8]:
     anchors = [(255, 255, 255), (110, 215, 255), (50, 110, 245), (60, 25, 160), (35, 5, 45)]
     channels = [np.interp(np.arange(256), stops, values) for values in zip(*anchors, strict=True)]
     return np.asarray(np.rint(np.stack(channels, axis=-1)), dtype=np.uint8)
+
+
+def colour_of_map(index: int) -> Colour:
+    """Return the colour of a map and its robot, counted from 0; from the eighth on colours come again."""
+    return MAP_COLOURS[index % len(MAP_COLOURS)]

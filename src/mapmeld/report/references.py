@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 from mapmeld.grid import OccupancyGrid
-from mapmeld.report.canvas import Canvas, Picture, known_window, paint_map
+from mapmeld.report.canvas import Canvas, Picture, known_window, paint_map, with_turn
 from mapmeld.report.marks import with_arrow
-from mapmeld.report.palette import ROBOT_COLOURS
+from mapmeld.report.palette import colour_of_map
 from mapmeld.report.sheet import Panel, compose
 from mapmeld.se2 import Pose2
 
@@ -52,18 +52,14 @@ def with_references(grid: OccupancyGrid, starts: Sequence[Pose2 | None]) -> tupl
         window = window.reaching([(arrow.x, arrow.y), tip], margin=1 + size // 40)
     canvas = paint_map(grid, window)
     for i, arrow in arrows.items():
-        canvas = with_arrow(canvas, arrow, length * canvas.px_per_cell, _colour(i), str(i + 1))
+        canvas = with_arrow(canvas, arrow, length * canvas.px_per_cell, colour_of_map(i), str(i + 1))
     return canvas, far
-
-
-def _colour(robot: int) -> tuple[int, int, int]:
-    return ROBOT_COLOURS[robot % len(ROBOT_COLOURS)]
 
 
 def references(
     grid: OccupancyGrid, starts: Sequence[Pose2 | None], names: Sequence[str], caption: str = ""
 ) -> Picture:
-    """Draw a merged map with the global reference of every robot: robot 1 blue, robot 2 red.
+    """Draw a merged map with the global reference of every robot: robot 1 red, robot 2 blue.
 
     Parameters
     ----------
@@ -72,11 +68,12 @@ def references(
     names
         What to call the maps in the legend.
     caption
-        A sentence below the picture.
+        A sentence below the picture; where the grid has a yaw, one about that is added.
     """
     canvas, far = with_references(grid, starts)
     drawn = [i for i, start in enumerate(starts) if start is not None and i not in far]
-    legend = [(_colour(i), f"start of robot {i + 1}: {names[i]}") for i in drawn]
+    legend = [(colour_of_map(i), f"start of robot {i + 1}: {names[i]}") for i in drawn]
+    caption = with_turn(caption, grid)
     if far:
         robots = ", ".join(str(i + 1) for i in far)
         caption = f"{caption} Outside the picture starts robot {robots}.".strip()
