@@ -51,28 +51,34 @@ def start(folder: Path, *arguments: str, unbuffered: bool = False, **streams: An
     return done.returncode, done.stderr
 
 
-def faulty(folder: Path, error: str, *arguments: str, where: str = "mapmeld.matching") -> tuple[int, str]:
-    """Run with a fault in `where`.match, or in the import of a module that is called so."""
+def run_script(folder: Path, prepared: str) -> tuple[int, str]:
+    """Match two maps after some lines of Python; return the exit code and what was said on stderr."""
     script = (
-        "import builtins, sys\n"
-        "def fail(*_, **__):\n"
-        f"    {error}\n"
-        "original = builtins.__import__\n"
-        "def import_(name, *rest):\n"
-        f"    if name == {where!r} and name == 'typer':\n"
-        "        fail()\n"
-        "    return original(name, *rest)\n"
-        "builtins.__import__ = import_\n"
-        f"if {where!r} != 'typer':\n"
-        "    import mapmeld.matching\n"
-        "    mapmeld.matching.match = fail\n"
-        f"sys.argv = ['mapmeld', *{list(arguments)!r}]\n"
+        f"{prepared}\n"
+        "import sys\n"
+        "sys.argv = ['mapmeld', 'match', 'a.yaml', 'b.yaml']\n"
         "from mapmeld.cli import main\n"
         "main()\n"
     )
     done = subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, text=True)
     assert done.stdout == ""
     return done.returncode, done.stderr
+
+
+def failing_match(error: str) -> str:
+    return f"import mapmeld.matching\ndef fail(*_):\n    {error}\nmapmeld.matching.match = fail"
+
+
+def interrupted_import(module: str) -> str:
+    return (
+        "import builtins\n"
+        "original = builtins.__import__\n"
+        "def import_(name, *rest):\n"
+        f"    if name == {module!r}:\n"
+        "        raise KeyboardInterrupt\n"
+        "    return original(name, *rest)\n"
+        "builtins.__import__ = import_"
+    )
 
 
 @posix
@@ -125,21 +131,27 @@ def test_without_stderr_the_exit_code_still_tells(folder: Path) -> None:
     ],
 )
 def test_a_fault_keeps_its_traceback_and_has_its_own_exit_code(folder: Path, error: str, said: str) -> None:
-    code, stderr = faulty(folder, error, "match", "a.yaml", "b.yaml")
+    code, stderr = run_script(folder, failing_match(error))
     assert code == FAULT
     assert stderr.startswith("Traceback")
     assert said in stderr.splitlines()[-1]
 
 
-def test_ctrl_c_at_work_and_in_the_first_import(folder: Path) -> None:
-    for where in ("mapmeld.matching", "typer"):
-        code, stderr = faulty(folder, "raise KeyboardInterrupt", "match", "a.yaml", "b.yaml", where=where)
-        assert code == INTERRUPTED
-        assert stderr.startswith("mapmeld: interrupted")
-        assert stderr.count("\n") == 1
+@pytest.mark.parametrize(
+    "prepared",
+    [
+        failing_match("raise KeyboardInterrupt"),
+        *map(interrupted_import, ("traceback", "typer", "mapmeld.matching.match")),
+    ],
+)
+def test_ctrl_c_at_work_and_in_imports(folder: Path, prepared: str) -> None:
+    code, stderr = run_script(folder, prepared)
+    assert code == INTERRUPTED
+    assert stderr.startswith("mapmeld: interrupted")
+    assert stderr.count("\n") == 1
 
 
 def test_the_face_of_the_command_line_is_light() -> None:
-    code = "import sys, mapmeld.cli; print([m for m in ('typer', 'rich', 'numpy') if m in sys.modules])"
+    code = "import sys, mapmeld.cli; print([m for m in ('typer', 'rich', 'numpy', 'traceback') if m in sys.modules])"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "[]"

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Annotated, Any
 
 import typer
@@ -29,19 +30,32 @@ from mapmeld.errors import MapmeldError
 _UsageError: type[Any] = typer.BadParameter.__mro__[1]
 
 
+@contextmanager
+def _interruption_said() -> Iterator[None]:
+    """Turn Ctrl-C into a line and an exit code; Typer itself would say nothing."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        say("interrupted, nothing more is written")
+        raise typer.Exit(INTERRUPTED) from error
+
+
 class Commands(TyperGroup):
     """The group of commands; known errors become one line on stderr and an exit code."""
+
+    def make_context(self, *args: Any, **kwargs: Any) -> Any:
+        """Read the command line as far as the name of the command."""
+        with _interruption_said():
+            return super().make_context(*args, **kwargs)
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command that was asked for."""
         try:
-            return super().invoke(ctx)
+            with _interruption_said():
+                return super().invoke(ctx)
         except MapmeldError as error:
             say(str(error))
             raise typer.Exit(BAD_INPUT) from error
-        except KeyboardInterrupt as error:
-            say("interrupted, nothing more is written")
-            raise typer.Exit(INTERRUPTED) from error
 
     def main(
         self,
@@ -63,7 +77,7 @@ class Commands(TyperGroup):
                 command = error.ctx.command_path if error.ctx else "mapmeld"
                 say(f"{_complaint(error)} (see {command} --help)")
             code = BAD_INPUT
-        except (typer.Abort, KeyboardInterrupt):
+        except typer.Abort:
             code = INTERRUPTED
         except BrokenPipeError:
             code = CLOSED_PIPE

@@ -34,8 +34,8 @@ def load_maps(paths: Sequence[str], resolution: float | None) -> list[OccupancyG
         if max(cells) > MAX_RATIO * min(cells):
             raise MapFileError.of(
                 path,
-                f"has cells of {cells[1]:g} m, {paths[0]} of {cells[0]:g} m, which differ by more than a factor "
-                f"of {MAX_RATIO}; check the resolutions",
+                f"has cells of {cells[1]:g} m, {paths[0]} of {cells[0]:g} m, which is more than a factor of "
+                f"{MAX_RATIO} apart; check the resolutions",
             )
     return grids
 
