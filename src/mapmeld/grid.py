@@ -192,6 +192,22 @@ class OccupancyGrid:
 MAX_RATIO = 100
 """Most by which the cell sizes of two maps may differ; beyond it a resolution is surely mistyped."""
 
+
+def check_resolutions(a: OccupancyGrid, b: OccupancyGrid) -> None:
+    """Refuse cell sizes that cannot both be right.
+
+    Raises
+    ------
+    ResolutionError
+        They differ by more than a factor of `MAX_RATIO`.
+    """
+    if not 1 / MAX_RATIO <= a.resolution / b.resolution <= MAX_RATIO:
+        raise ResolutionError(
+            f"cells of {a.resolution:g} m and of {b.resolution:g} m cannot be laid over one another: "
+            f"they differ by more than a factor of {MAX_RATIO}; check the resolutions"
+        )
+
+
 # Rows of the target that `resample` works on at a time: bounds memory at about 100 MB.
 _BLOCK_CELLS = 1 << 20
 
@@ -230,12 +246,7 @@ def resample(
     out = np.full((rows, cols), UNKNOWN, np.int8)
     if not (grid.cells.size and out.size):
         return out
-    ratio = target.resolution / grid.resolution
-    if not 1 / MAX_RATIO <= ratio <= MAX_RATIO:
-        raise ResolutionError(
-            f"cells of {grid.resolution:g} m and of {target.resolution:g} m cannot be laid over one another: "
-            f"they differ by more than a factor of {MAX_RATIO}; check the resolutions"
-        )
+    check_resolutions(grid, target)
     # One affine map from target lattice to grid lattice.
     T_grid_target = grid.origin.inverse() @ T_target_grid.inverse() @ target.origin
     scale = target.resolution / grid.resolution

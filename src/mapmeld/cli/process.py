@@ -19,7 +19,7 @@ def run_process() -> None:
         # Worse than useless: the next file to be opened would take its place.
         say("standard output is closed; if it is not wanted, send it to /dev/null")
         sys.exit(BAD_INPUT)
-    if isinstance(sys.stdout.buffer, io.RawIOBase):
+    if isinstance(sys.stdout, io.TextIOWrapper) and isinstance(sys.stdout.buffer, io.RawIOBase):
         # `python -u` keeps nothing of what could not be written; to tell an error of stdout, something must.
         encoding = sys.stdout.encoding
         sys.stdout = io.TextIOWrapper(io.BufferedWriter(sys.stdout.detach()), encoding)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from mapmeld.errors import MapmeldError
-from mapmeld.grid import OccupancyGrid
+from mapmeld.grid import OccupancyGrid, check_resolutions
 from mapmeld.matching.alphabet import AlphabetParameters, match_alphabet
 from mapmeld.matching.baselines import (
     FeatureAkazeParameters,
@@ -96,6 +96,8 @@ def match(
     ------
     UnknownMethodError
         `method` is not known.
+    ResolutionError
+        The maps' cell sizes differ by more than a factor of 100.
     TypeError
         `a` or `b` is not a map, or `parameters` is of another method's class.
     """
@@ -111,6 +113,7 @@ def match(
         raise TypeError(
             f"method {method!r} takes {chosen.parameters.__name__}, not {type(parameters).__name__}"
         )
+    check_resolutions(a, b)
     started = time.perf_counter()
     result = chosen.run(a, b, parameters)
     return replace(result, method=method, seconds=time.perf_counter() - started)

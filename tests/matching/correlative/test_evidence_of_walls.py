@@ -56,7 +56,7 @@ def test_a_wall_deep_in_free_space_is_contradicted() -> None:
 
 
 def test_a_wall_next_to_a_wall_is_neither_explained_nor_contradicted() -> None:
-    e = weighed(room((3, 2, 3.1, 6)), room((3.25, 2, 3.35, 6)))
+    e = weighed(room((3, 2, 3.1, 6)), room((3.2, 2, 3.3, 6)))
     assert e.contra == 0
     assert e.hit == pytest.approx(e.wall - 8, rel=0.02)
 
@@ -90,7 +90,7 @@ def test_the_overlap_is_the_area_known_in_both() -> None:
     nothing = weighed(room(), room(), Pose2(50, 0, 0))
     assert nothing.overlap_area == nothing.overlap == 0
     assert nothing.hit == 0
-    assert nothing.surplus == 0
+    assert nothing.surplus == pytest.approx(0, abs=1e-3)
 
 
 def test_chance_is_the_share_of_the_floor_by_a_wall() -> None:

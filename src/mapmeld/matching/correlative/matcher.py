@@ -22,14 +22,16 @@ from mapmeld.matching.correlative.wall_map import Doubles, WallMap
 from mapmeld.matching.result import Alternative, MatchResult, Verdict
 from mapmeld.se2 import wrap_angle
 
-COARSE_SCALES, COARSE_POINTS = (0.8, 0.6, 0.5, 0.4), 160
-FINE_SCALES, FINE_POINTS = (0.3, 0.25, 0.2, 0.15, 0.15), 600
+COARSE_SCALES, COARSE_POINTS = (0.8, 0.6, 0.4), 160
+FINE_SCALES, FINE_POINTS = (0.3, 0.2, 0.15, 0.15), 600
 LOOKED_AT = 4  # transforms for which the full evidence is measured
 UNBENT_KEEPS = 0.8  # share of the walls explained as they lie that a transform found by bending must keep
-RIVAL_SCORE = 1.7  # P = 0.85 if the mode stood alone
-RIVAL_SCORE_SHARE = 0.5  # of the best mode's score: covering less, it has less to show
+RIVAL_SCORE = 0.0  # even odds if the mode stood alone
 RIVAL_EXPLAINS = 0.95  # of the share of walls that the best mode explains
 RIVAL_CONTRADICTED = 0.01  # more, as a share of the walls, than in the best mode
+RIVAL_CLEAN = 0.05  # share of the walls contradicted from which the maps themselves tell against it
+FIXED_LEAST = 2.0  # [m] of wall that must fix every direction
+WALL_LEAST = 40.0  # [m] of wall of both maps in the overlap; the probability was fitted on more
 APART = 0.5  # [m] modes nearer than this (or than the maps bend) are one
 APART_TURNED = 0.09  # [rad]
 
@@ -65,7 +67,7 @@ def match_correlative(
     prepared_a, prepared_b = prepare(a), prepare(b)
     if prepared_a is None or prepared_b is None:
         return _rejected(f"nothing to match on: map {'a' if prepared_a is None else 'b'} has no obstacle")
-    if _comes_first(b, prepared_b.walls, a, prepared_a.walls):
+    if _comes_first(prepared_b.walls, prepared_a.walls):
         return _inverted(_match(prepared_b, prepared_a, parameters))
     return _match(prepared_a, prepared_b, parameters)
 
@@ -74,7 +76,7 @@ def _match(a: PreparedMap, b: PreparedMap, parameters: CorrelativeParameters) ->
     modes = ranked_modes(a, b, parameters)
     if not modes:
         return _rejected("nothing to match on: the walls fit nowhere")
-    probabilities = fitted_model().probabilities(_level_rivals(modes))
+    probabilities = mode_probabilities(modes, fitted_model())
     return _answer(a.walls, b.walls, modes, probabilities, parameters.accept_probability)
 
 
@@ -142,23 +144,37 @@ def _differ(walls_b: WallMap, s: Doubles, t: Doubles, metres: float, radians: fl
     return bool(abs(middle[0] - middle[1]) > metres)
 
 
+def mode_probabilities(modes: Sequence[Mode], model: ProbabilityModel) -> Doubles:
+    """Return P(right) of each mode.
+
+    What the model says, less where it cannot know: where next to no wall fixes some direction, so that
+    the maps slide along one another, or with less wall than it was fitted on.
+    """
+    doubt = [
+        min(1.0, mode.evidence.weak / FIXED_LEAST) * min(1.0, mode.evidence.wall / WALL_LEAST)
+        for mode in modes
+    ]
+    return np.asarray(model.probabilities(_level_rivals(modes)) * np.array(doubt))
+
+
 def _level_rivals(modes: Sequence[Mode]) -> list[float]:
     """Return the modes' scores, those of rivals raised to the best's.
 
-    A rival could be accepted if it stood alone, and explains what it covers as well as the best does
-    what that covers. Then the best only covers more, which in a place that repeats itself says
-    nothing: the maps would fit equally well one room further on.
+    A rival explains what it covers as well as the best does what that covers, next to nothing
+    speaks against it, and it would be more likely right than not if it stood alone. Then the best
+    only covers more, which in a place that repeats itself says nothing: the maps would fit equally
+    well one room further on.
     """
     best = modes[0]
     explained, contradicted = best.evidence.shares
     scores = []
     for mode in modes:
         its_explained, its_contradicted = mode.evidence.shares
-        as_good = (
-            its_explained >= RIVAL_EXPLAINS * explained
-            and its_contradicted <= contradicted + RIVAL_CONTRADICTED
+        rival = (
+            mode.score > RIVAL_SCORE
+            and its_explained >= RIVAL_EXPLAINS * explained
+            and its_contradicted <= min(contradicted + RIVAL_CONTRADICTED, RIVAL_CLEAN)
         )
-        rival = as_good and mode.score > max(RIVAL_SCORE, RIVAL_SCORE_SHARE * best.score)
         scores.append(best.score if rival else min(mode.score, best.score))
     return scores
 
@@ -174,6 +190,9 @@ def _answer(
     )
     if probabilities[0] >= accept:
         verdict = Verdict.ACCEPTED
+    elif best.weak < FIXED_LEAST and modes[0].score > RIVAL_SCORE:
+        verdict = Verdict.AMBIGUOUS
+        reason += f"; only {best.weak:.1f} m of it fix the place along the others"
     elif probabilities.sum() >= accept:
         verdict = Verdict.AMBIGUOUS
         reason += "; another transform explains the maps about as well"
@@ -211,11 +230,11 @@ def _rejected(reason: str) -> MatchResult:
 
 
 # ---------------------------------------------------------------------- both maps play the same part
-def _comes_first(b: OccupancyGrid, walls_b: WallMap, a: OccupancyGrid, walls_a: WallMap) -> bool:
+def _comes_first(b: WallMap, a: WallMap) -> bool:
     """Whether b is the one to lay the other on: the larger map, or any order that swapping respects."""
-    key_a, key_b = ((w.area, len(w.points), w.shape) for w in (walls_a, walls_b))
+    key_a, key_b = ((w.area, len(w.points), w.shape) for w in (a, b))
     if key_a == key_b:
-        return b.cells.tobytes() > a.cells.tobytes()
+        return b.points.tobytes() > a.points.tobytes()
     return key_b > key_a
 
 

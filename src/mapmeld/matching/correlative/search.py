@@ -228,7 +228,8 @@ def _distinct(rows: Rows) -> list[Rows]:
     rows = rows[: 5 * LISTED]
     x, y, turn = rows[:, 0], rows[:, 1], rows[:, 2]
     near = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2 < APART_METRES**2
-    near &= np.cos(turn[:, None] - turn) > math.cos(APART_RADIANS)
+    heading = np.stack([np.cos(turn), np.sin(turn)])
+    near &= heading.T @ heading > math.cos(APART_RADIANS)
     kept: list[int] = []
     alive = np.ones(len(rows), np.bool_)
     while len(kept) < LISTED and alive.any():

@@ -82,13 +82,13 @@ class WallMap:
 def wall_map(masks: MapMasks) -> WallMap:
     """Compute the fields and wall points of a map."""
     wall = masks.wall
-    spots = cv2.findNonZero(wall)
+    row, col = np.nonzero(wall != 0)
     k = max(1, round(FIELD_CELL / masks.resolution))
     while wall.size / k**2 > MAX_FIELD_CELLS:
         k += 1
     cell = masks.resolution * k
     shape = (-(-wall.shape[0] // k) + 2 * BORDER, -(-wall.shape[1] // k) + 2 * BORDER)
-    own, points, normals, straight = _wall_points(np.asarray(spots, np.int32).reshape(-1, 2), k, shape)
+    own, points, normals, straight = _wall_points(row, col, k, shape)
     n = len(own)
 
     walls = np.zeros(shape[0] * shape[1], np.uint8)
@@ -128,7 +128,7 @@ def wall_map(masks: MapMasks) -> WallMap:
 
 
 def _wall_points(
-    spots: NDArray[np.int32], k: int, shape: tuple[int, int]
+    row: Index, col: Index, k: int, shape: tuple[int, int]
 ) -> tuple[Index, NDArray[np.complex128], NDArray[np.complex128], Doubles]:
     """Return one wall point per field cell that holds wall: (flat field index, place, normal, straightness).
 
@@ -136,7 +136,6 @@ def _wall_points(
     cells in the 3 x 3 field cells around it. This takes the raggedness of a cell out of the walls.
     Places are in field cells.
     """
-    col, row = spots[:, 0], spots[:, 1]
     width = shape[1]
     flat = (row // k + BORDER) * width + (col // k + BORDER)
     holds = np.zeros(shape[0] * width, bool)
