@@ -161,7 +161,6 @@ def test_different_buildings_are_rejected(turn: float) -> None:
         (school, (0, 0, 20, 3), (0, 3, 20, 9)),
         (school, (0, 0, 20, 4), (0, 4, 20, 9)),
         (school, (0, 0, 10, 9), (11, 0, 20, 9)),
-        pytest.param(office, (0, 0, 16, 6.6), (0, 6.6, 16, 12), marks=SLANTED),
         (office, (0, 0, 16, 6.3), (0, 7.3, 16, 12)),  # fit well, though on little wall, turned by 90 degrees
     ],
 )
@@ -170,6 +169,14 @@ def test_parts_that_do_not_overlap_are_not_accepted(
 ) -> None:
     b = seen_from(cut(building(), *part_b), Pose2(2.0, -7.0, turn))
     assert mapmeld.match(cut(building(), *part_a), b).verdict is not Verdict.ACCEPTED
+
+
+@pytest.mark.xfail(
+    strict=True, reason="slanted walls count about twice, so that there seems to be enough of them"
+)
+def test_parts_that_do_not_overlap_are_not_accepted_on_a_slanted_lattice() -> None:
+    b = seen_from(cut(A, 0, 6.6, 16, 12), B_T)
+    assert mapmeld.match(cut(A, 0, 0, 16, 6.6), b).verdict is not Verdict.ACCEPTED
 
 
 def assert_ambiguous(result: MatchResult, least: int) -> None:
