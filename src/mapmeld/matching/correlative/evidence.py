@@ -113,9 +113,11 @@ def weigh(pa: WallMap, pb: WallMap, t: Doubles, n: int = 1200) -> list[Evidence]
     inside = near | (rigid.depth >= 0) | (bent.depth >= 0)
     explained = metres * _hits(bent)
     hit_bent = explained.sum(axis=1) + 1e-6
-    line = explained * (bent.straight > 0.3)
-    nx, ny = bent.normal.real, bent.normal.imag
-    xx, xy, yy = (np.sum(line * v, axis=1) for v in (nx * nx, nx * ny, ny * ny))
+    turn, _ = turn_and_shift(t)
+    lines_a = np.broadcast_to(pa.lines[:n], (len(t), len(pa.lines[:n])))
+    lines = np.concatenate([pb.lines[:n] * turn, lines_a], axis=1)
+    nx, ny = lines.real, lines.imag
+    xx, xy, yy = (np.sum(explained * v, axis=1) for v in (nx * nx, nx * ny, ny * ny))
     area, close, deep = _common_floor(pa, pb, t)
     columns = zip(
         (inside @ metres + 1e-6).tolist(),

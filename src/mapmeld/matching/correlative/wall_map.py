@@ -25,6 +25,7 @@ Index = NDArray[np.intp]
 FIELD_CELL = 0.1  # [m] lattice on which the nearest wall is looked up; finer detail is in the wall points
 MAX_FIELD_CELLS = 6_000_000  # larger maps get coarser fields, so that time and memory stay bounded
 BORDER = 2  # unknown cells around a field, where points outside the map land
+STRAIGHT_LEAST = 0.3  # of a line; below, a wall point has no direction
 FLOOR_SAMPLE = 1000  # known cells that measure the overlap
 
 
@@ -50,6 +51,8 @@ class WallMap:
         in which the first k are a fair sample, for every k.
     straight
         How line-like the wall is at each point (n,), 0 (blob, corner) .. 1.
+    lines
+        Unit normals (n,) of the lines that the points lie on, thick walls included; 0 where there is none.
     metres
         Length of wall that one point stands for [m].
     floor
@@ -66,6 +69,7 @@ class WallMap:
     points: Plane
     normals: Plane
     straight: Floats
+    lines: Plane
     metres: float
     floor: Plane
     area: float
@@ -88,8 +92,8 @@ def wall_map(masks: MapMasks) -> WallMap:
         k += 1
     cell = masks.resolution * k
     shape = (-(-wall.shape[0] // k) + 2 * BORDER, -(-wall.shape[1] // k) + 2 * BORDER)
-    own, points, normals, straight = _wall_points(row, col, k, shape)
-    n = len(own)
+    wall_points = _wall_points(row, col, k, shape)
+    own, n = wall_points.own, len(wall_points.own)
 
     walls = np.zeros(shape[0] * shape[1], np.uint8)
     walls[own] = 255
@@ -118,23 +122,33 @@ def wall_map(masks: MapMasks) -> WallMap:
         shape=shape,
         depth=depth.ravel(),
         nearest=of_label[labels],
-        points=(points[order] * cell).astype(np.complex64),
-        normals=normals[order].astype(np.complex64),
-        straight=straight[order].astype(np.float32),
+        points=(wall_points.place[order] * cell).astype(np.complex64),
+        normals=wall_points.normal[order].astype(np.complex64),
+        straight=wall_points.straight[order].astype(np.float32),
+        lines=wall_points.line[order].astype(np.complex64),
         metres=cell,
         floor=((floor_col - BORDER + 0.5 + 1j * (floor_row - BORDER + 0.5)) * cell).astype(np.complex64),
         area=cv2.countNonZero(masks.known) * masks.resolution**2,
     )
 
 
-def _wall_points(
-    row: Index, col: Index, k: int, shape: tuple[int, int]
-) -> tuple[Index, NDArray[np.complex128], NDArray[np.complex128], Doubles]:
-    """Return one wall point per field cell that holds wall: (flat field index, place, normal, straightness).
+@dataclass(frozen=True, slots=True, eq=False)
+class _WallPoints:
+    """One point for each field cell that holds wall; places in field cells."""
+
+    own: Index  # flat field index
+    place: NDArray[np.complex128]
+    normal: NDArray[np.complex128]
+    straight: Doubles
+    line: NDArray[np.complex128]
+
+
+def _wall_points(row: Index, col: Index, k: int, shape: tuple[int, int]) -> _WallPoints:
+    """Find the wall points of the map cells (row, col), k x k of which make a field cell.
 
     A point is moved onto the wall's middle line, found from the first and second moments of the wall
     cells in the 3 x 3 field cells around it. This takes the raggedness of a cell out of the walls.
-    Places are in field cells.
+    A thick wall looks like a blob to them; whether it is a line after all, 5 x 5 tell.
     """
     width = shape[1]
     flat = (row // k + BORDER) * width + (col // k + BORDER)
@@ -147,31 +161,49 @@ def _wall_points(
     x, y = (col % k + 0.5) / k, (row % k + 0.5) / k
     i = place[flat]
     # Row n stays empty: it answers for neighbours without wall.
-    m = np.stack([np.bincount(i, v, n + 1) for v in (None, x, y, x * x, x * y, y * y)], axis=1)
-    s = np.zeros((n, 6))
-    for dy in (-1, 0, 1):
-        for dx in (-1, 0, 1):
+    m = np.stack([np.bincount(i, v, n + 1) for v in (None, x, y, x * x, x * y, y * y)], axis=1).astype(
+        np.float64
+    )
+    along, straight, middle = _lines(m, place, own, width, reach=1)
+    line = np.where(straight > STRAIGHT_LEAST, along * 1j, 0)
+    blob = np.flatnonzero(straight <= STRAIGHT_LEAST)
+    if len(blob):
+        along_wide, straight_wide, _ = _lines(m, place, own[blob], width, reach=2)
+        line[blob] = np.where(straight_wide > STRAIGHT_LEAST, along_wide * 1j, 0)
+    mine = (m[:n, 1] + 1j * m[:n, 2]) / m[:n, 0]
+    on_line = middle + along * ((mine - middle) * along.conj()).real
+    row_of, col_of = np.divmod(own, width)
+    corner = (col_of - BORDER) + 1j * (row_of - BORDER)
+    spot = corner + np.where(straight > STRAIGHT_LEAST, on_line, mine)
+    return _WallPoints(own, spot, along * 1j, straight, line)
+
+
+def _lines(
+    m: Doubles, place: NDArray[np.int32], own: Index, width: int, reach: int
+) -> tuple[NDArray[np.complex128], Doubles, NDArray[np.complex128]]:
+    """Fit a line to the wall around each of the field cells `own`, `reach` field cells to every side.
+
+    Returns its direction, how straight the wall is, and its middle, seen from the cell's corner.
+    """
+    s = np.zeros((len(own), 6))
+    for dy in range(-reach, reach + 1):
+        for dx in range(-reach, reach + 1):
             a = m[place[own + (dy * width + dx)]]
             s += a  # then from the neighbour's corner to one's own
             if dx:
                 s[:, 1] += dx * a[:, 0]
-                s[:, 3] += 2 * dx * a[:, 1] + a[:, 0]
+                s[:, 3] += 2 * dx * a[:, 1] + dx * dx * a[:, 0]
                 s[:, 4] += dx * a[:, 2]
             if dy:
                 s[:, 2] += dy * a[:, 0]
                 s[:, 4] += dy * a[:, 1] + dx * dy * a[:, 0]
-                s[:, 5] += 2 * dy * a[:, 2] + a[:, 0]
+                s[:, 5] += 2 * dy * a[:, 2] + dy * dy * a[:, 0]
     count, mx, my = s[:, 0], s[:, 1] / s[:, 0], s[:, 2] / s[:, 0]
     xx, xy, yy = s[:, 3] / count - mx * mx, s[:, 4] / count - mx * my, s[:, 5] / count - my * my
     half, root = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
     along = np.exp(0.5j * np.arctan2(2 * xy, xx - yy))
     straight = np.where(count >= 3, np.clip(1 - 3 * (half - root) / np.maximum(half + root, 1e-6), 0, 1), 0)
-    mine = (m[:n, 1] + 1j * m[:n, 2]) / m[:n, 0]
-    middle = mx + 1j * my
-    on_line = middle + along * ((mine - middle) * along.conj()).real
-    row_of, col_of = np.divmod(own, width)
-    corner = (col_of - BORDER) + 1j * (row_of - BORDER)
-    return own, corner + np.where(straight > 0.3, on_line, mine), along * 1j, straight
+    return along, straight, mx + 1j * my
 
 
 def _share(mask: Image, k: int, shape: tuple[int, int]) -> Image:
