@@ -124,7 +124,7 @@ def test_without_stderr_the_exit_code_still_tells(folder: Path) -> None:
     ("error", "said"),
     [
         ("raise MemoryError", "MemoryError"),
-        ("fail()", "RecursionError"),
+        ("raise RecursionError", "RecursionError"),
         ("[][0]", "IndexError"),
         ("raise OSError(28, 'No space left on device')", "OSError"),
         ("open('/nowhere/at/all')", "FileNotFoundError"),
