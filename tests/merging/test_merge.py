@@ -104,6 +104,21 @@ def test_a_map_that_does_not_fit_on_all_is_tried_on_each(monkeypatch: pytest.Mon
     assert maps_in(result.grid) == (0, 1, 2)
 
 
+def test_what_is_ambiguous_on_all_is_not_settled_by_one_that_shows_less(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def of_a_repeating_place(a: OccupancyGrid, b: OccupancyGrid, *_: object) -> MatchResult:
+        on_all = maps_in(a) == (0, 1) and maps_in(b) == (2,)
+        first_try = maps_in(a) == (0,) and maps_in(b) == (1,)
+        verdict = Verdict.AMBIGUOUS if on_all else Verdict.ACCEPTED
+        return MatchResult(Pose2(5.0 if first_try else 9.0), verdict, "")
+
+    use(monkeypatch, of_a_repeating_place)
+    result = merge(spots(3))
+    assert result.components == ((0, 1), (2,))
+    assert result.refused[2].verdict is Verdict.AMBIGUOUS
+
+
 @pytest.mark.parametrize("verdict", [Verdict.REJECTED, Verdict.AMBIGUOUS])
 def test_only_what_is_accepted_is_merged(verdict: Verdict, monkeypatch: pytest.MonkeyPatch) -> None:
     answer = MatchResult(Pose2(2), verdict, "a good guess, perhaps", similarity=0.9)

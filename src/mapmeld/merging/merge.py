@@ -101,7 +101,7 @@ def merge(
 ) -> MergeResult:
     """Match maps and merge those that fit, two by two as in the paper (section 4).
 
-    Each remaining map is matched with the merged result so far and, should it not fit there, with
+    Each remaining map is matched with the merged result so far and, should it be rejected there, with
     each of the maps in it (a crowded merged map can hide a fit); and so on until none fits
     any more. What is left starts a component of its own.
 
@@ -200,7 +200,8 @@ def _attempts(
 ) -> Iterator[Joint]:
     """Give the match with the merged map and then, as long as more are wanted, with each map in it."""
     yield on_all
-    if len(on_all.reference) > 1:
+    # Ambiguous on all that is known stays so: a single map may only show too little to tell.
+    if len(on_all.reference) > 1 and on_all.result.verdict is Verdict.REJECTED:
         for member in poses:
             result = match(grids[member], grids[on_all.index], method, parameters)
             yield Joint((member,), on_all.index, result)

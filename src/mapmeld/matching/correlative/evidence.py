@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mapmeld.matching.correlative.alignment import WallPairs, look_up, turn_and_shift
 from mapmeld.matching.correlative.bending import nearest_rigid, patch_shifts, patches_of, smooth_bending
-from mapmeld.matching.correlative.wall_map import Doubles, Floats, WallMap
+from mapmeld.matching.correlative.wall_map import STRAIGHT_LEAST, Doubles, Floats, WallMap
 
 HIT = 0.1  # [m] across the wall: explained by the other map's wall
 NEAR = 0.3  # [m] next to the other map's wall
@@ -159,7 +159,7 @@ def _common_floor(pa: WallMap, pb: WallMap, t: Doubles) -> tuple[Doubles, Double
 def _hits(p: WallPairs) -> NDArray[np.bool_]:
     """Whether a wall point (k, m) is explained: a wall of the same direction within `HIT` across it."""
     r, along = p.across()
-    same_way = (p.cosine() > 0.85) | (p.straight < 0.3)
+    same_way = (p.cosine() > 0.85) | (p.straight < STRAIGHT_LEAST)
     return np.asarray((np.abs(r) < HIT) & (np.abs(along) < 0.2) & same_way)
 
 
