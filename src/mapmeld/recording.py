@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from mapmeld.se2 import Pose2
 
+AT_BASE = Pose2(0.0, 0.0, 0.0)
+
 
 @dataclass(frozen=True, slots=True)
 class Laser:
@@ -30,7 +32,7 @@ class Laser:
     first_angle: float
     step: float
     max_range: float
-    T_base_laser: Pose2 = Pose2(0.0, 0.0, 0.0)
+    T_base_laser: Pose2 = AT_BASE
 
     def bearings(self) -> NDArray[np.float64]:
         """Bearings of the beams (beams,) [rad]."""
