@@ -36,7 +36,7 @@ class Laser:
 
     def bearings(self) -> NDArray[np.float64]:
         """Bearings of the beams (beams,) [rad]."""
-        return self.first_angle + self.step * np.arange(self.beams)
+        return np.asarray(self.first_angle + self.step * np.arange(self.beams), np.float64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,13 +7,13 @@ import pytest
 from tiny_dataset import elsewhere, row, wrong
 
 from mapmeld.evaluation import TrialRow
-from mapmeld.evaluation.extra import MissingExtraError
 from mapmeld.evaluation.plots import (
     precision_recall_figure,
     reliability_figure,
     success_figure,
     write_figures,
 )
+from mapmeld.extras import MissingExtraError
 from mapmeld.io import MapFileError
 
 

@@ -160,10 +160,10 @@ def _tolerances(texts: Sequence[str], sets: Sequence[Dataset]) -> dict[str, Tole
 def _check_out(out: Path, force: bool) -> None:
     """Find out before the work that its outcome could not be kept."""
     from mapmeld.cli.folders import check_folder
-    from mapmeld.evaluation.extra import required
+    from mapmeld.extras import required
 
     for module in ("pyarrow.parquet", "matplotlib.figure"):
-        required(module)
+        required(module, "benchmark")
     check_folder(out, force=force or (out / SETTINGS).is_file())
 
 

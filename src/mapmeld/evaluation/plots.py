@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mapmeld.evaluation.calibration import expected_calibration_error, precision_recall, reliability
-from mapmeld.evaluation.extra import required
 from mapmeld.evaluation.pairs import Kind
 from mapmeld.evaluation.rows import TrialRow
 from mapmeld.evaluation.tables import grouped
+from mapmeld.extras import required
 from mapmeld.io.atomic import write_files
 from mapmeld.matching import Verdict
 
@@ -243,8 +243,8 @@ def _figure(
     title: str, panels: Sequence[Panel | None], columns: int, styles: Mapping[str, Style] | None = None
 ) -> Figure:
     """Lay panels out, None for a gap; with `styles`, one legend for all of them stands below."""
-    figure_module = required("matplotlib.figure")
-    agg = required("matplotlib.backends.backend_agg")
+    figure_module = required("matplotlib.figure", "benchmark")
+    agg = required("matplotlib.backends.backend_agg", "benchmark")
     lines = -(-len(panels) // columns)
     width, height = _PANEL
     figure: Figure = figure_module.Figure(
@@ -261,7 +261,7 @@ def _figure(
         axes.set_title(_literal(name), fontsize=10, pad=8)
     figure.suptitle(title, fontsize=11)
     if styles:
-        line = required("matplotlib.lines").Line2D
+        line = required("matplotlib.lines", "benchmark").Line2D
         signs = [line([], [], **style) for style in styles.values()]
         names = [_literal(name) for name in styles]
         figure.legend(

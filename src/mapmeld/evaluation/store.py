@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from mapmeld.errors import MapmeldError
-from mapmeld.evaluation.extra import required
 from mapmeld.evaluation.rows import COLUMN_KINDS, TrialKey, TrialRow
+from mapmeld.extras import required
 from mapmeld.io.atomic import write_files
 
 _NAMES = [field.name for field in fields(TrialRow)]
@@ -59,7 +59,7 @@ def add_rows(folder: Path, rows: Sequence[TrialRow]) -> None:
     """
     if not rows:
         return
-    parquet = required("pyarrow.parquet")
+    parquet = required("pyarrow.parquet", "benchmark")
     content = io.BytesIO()
     parquet.write_table(_table(rows), content, write_page_checksum=True)
     try:
@@ -119,7 +119,7 @@ def _remove(files: Iterable[Path]) -> None:
 
 
 def _read_part(part: Path) -> list[TrialRow]:
-    pyarrow, parquet = required("pyarrow"), required("pyarrow.parquet")
+    pyarrow, parquet = required("pyarrow", "benchmark"), required("pyarrow.parquet", "benchmark")
     try:
         table = parquet.ParquetFile(part, page_checksum_verification=True).read()
     except (OSError, pyarrow.ArrowException) as error:
@@ -142,14 +142,14 @@ def _row(values: dict[str, Any]) -> TrialRow:
 
 
 def _table(rows: Sequence[TrialRow]) -> Any:
-    pyarrow = required("pyarrow")
+    pyarrow = required("pyarrow", "benchmark")
     dicts = [asdict(row) for row in rows]
     columns = {name: [values[name] for values in dicts] for name in _NAMES}
     return pyarrow.table(columns, schema=_schema())
 
 
 def _schema() -> Any:
-    pyarrow = required("pyarrow")
+    pyarrow = required("pyarrow", "benchmark")
     kinds = {
         "string": pyarrow.string(),
         "int64": pyarrow.int64(),

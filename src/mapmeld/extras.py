@@ -1,4 +1,4 @@
-"""The optional libraries of the benchmark, imported where they are used."""
+"""Libraries that are extras, imported where they are used."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from mapmeld.errors import MapmeldError
 
 
 class MissingExtraError(MapmeldError):
-    """A library of the extra `benchmark` is not installed."""
+    """A library of an extra is not installed."""
 
 
-def required(module: str) -> Any:
-    """Import a module of the extra `benchmark`.
+def required(module: str, extra: str) -> Any:
+    """Import a module that comes with an extra.
 
     Raises
     ------
@@ -25,5 +25,5 @@ def required(module: str) -> Any:
     except ImportError as error:
         library = module.partition(".")[0]
         raise MissingExtraError(
-            f'{library} is needed for this and cannot be imported ({error}): pip install "mapmeld[benchmark]"'
+            f'{library} is needed for this and cannot be imported ({error}): pip install "mapmeld[{extra}]"'
         ) from error
