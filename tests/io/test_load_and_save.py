@@ -81,7 +81,9 @@ def test_the_format_can_be_named(tmp_path: Path) -> None:
     assert np.array_equal(picture.cells, GRID.cells)
     with pytest.raises(MapFileError, match=r"not a known kind of map file .*yaml .*pgm"):
         load(tmp_path / "description")
-    with pytest.raises(MapFileError, match=r"no map format is called 'bag' \(there are: map_server, image\)"):
+    with pytest.raises(
+        MapFileError, match=r"no map format is called 'bag' \(there are: map_server, image, recording\)"
+    ):
         load(tmp_path / "description", format="bag")
 
 
