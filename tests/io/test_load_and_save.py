@@ -94,10 +94,11 @@ def test_readers_get_the_path_as_it_was_given(monkeypatch: pytest.MonkeyPatch) -
         seen.append((path, resolution))
         return GRID
 
-    monkeypatch.setitem(FORMATS, "bag", io.MapFormat((".bag",), read))
-    assert load("some//file.bag#/map@12.5", format="bag") is GRID
+    monkeypatch.setitem(FORMATS, "recording", io.MapFormat((".bag",), read))
+    assert load("some//file.bag#/map@12.5") is GRID
+    assert load("any#thing@all", format="recording") is GRID
     assert load("file.BAG") is GRID
-    assert seen == [("some//file.bag#/map@12.5", None), ("file.BAG", None)]
+    assert seen == [("some//file.bag#/map@12.5", None), ("any#thing@all", None), ("file.BAG", None)]
 
 
 def test_messages_stay_on_one_line_whatever_the_name(tmp_path: Path) -> None:

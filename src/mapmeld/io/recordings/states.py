@@ -135,7 +135,7 @@ def map_states(path: AnyPath, topic: str | None = None, *, damaged: Damaged = "r
         Where the map is published; may be left out if there is only one with maps.
     damaged
         "refuse": an error where something cannot be read. "use": pass over it, and count it in
-        `MapStates.left_out`. The recording is then read twice, from front to back.
+        `MapStates.left_out`. The recording is then gone through three times.
 
     Returns
     -------
