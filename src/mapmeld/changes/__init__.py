@@ -2,6 +2,7 @@
 
 from mapmeld.changes.classes import Change
 from mapmeld.changes.diff import MapDiff, NoMatchError, diff
+from mapmeld.changes.rebase import rebase
 from mapmeld.changes.regions import Region
 
-__all__ = ["Change", "MapDiff", "NoMatchError", "Region", "diff"]
+__all__ = ["Change", "MapDiff", "NoMatchError", "Region", "diff", "rebase"]

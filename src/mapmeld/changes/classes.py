@@ -43,7 +43,7 @@ def classify(old: OccupancyGrid, new: OccupancyGrid, tolerance: float) -> Classe
     old, new
         The earlier and the later map, on the same lattice.
     tolerance
-        How far from an obstacle of the other map [m] (between centres of cells) an obstacle is still that one.
+        How far from an obstacle of the other map, centre of cell to centre [m], an obstacle is that one.
     """
     classes = np.full(old.shape, Change.UNKNOWN, np.uint8)
     classes[old.known] = Change.UNSEEN

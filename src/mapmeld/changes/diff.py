@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,15 +12,31 @@ from mapmeld.changes.classes import Change, Classes, classify
 from mapmeld.changes.local_bending import bend_onto
 from mapmeld.changes.regions import Region, find_regions
 from mapmeld.errors import MapmeldError
-from mapmeld.grid import Cells, OccupancyGrid, check_resolutions
+from mapmeld.grid import UNKNOWN, Cells, OccupancyGrid, check_resolutions
 from mapmeld.matching import DEFAULT_METHOD, MatchResult, Verdict, match
 from mapmeld.merging import lattice_for_all
 from mapmeld.se2 import Pose2
 
 TOLERANCE = 0.2
+"""[m]; what local bending leaves of drift, and walls drawn by other scans."""
 MAX_BEND = 0.5
-LEAST_AREA = 0.02
+"""[m]; real maps of a floor bend by up to some 0.4 m."""
+MIN_AREA = 0.02
+"""[m^2]; the legs of one chair, eight cells of 0.05 m."""
 GAP = 0.3
+"""[m]; cells of one kind nearer than this belong to one change."""
+
+PERCENT: Mapping[Change, int] = {
+    Change.SAME: 0,
+    Change.UNSEEN: 20,
+    Change.EXPLORED: 40,
+    Change.VANISHED: 60,
+    Change.APPEARED: 100,
+}
+"""What stands for each class in the change map [percent]; UNKNOWN is unknown there too.
+
+Only what appeared is an obstacle by the usual thresholds.
+"""
 
 
 class NoMatchError(MapmeldError):
@@ -81,6 +98,15 @@ class MapDiff:
         parts.append(f"{self.area(Change.UNSEEN):.1f} m2 not seen again")
         return f"{'; '.join(parts)}; {both:.1f} m2 known in both"
 
+    def as_map(self) -> OccupancyGrid:
+        """Return the classes as a map: occupied what appeared, and a percentage for every other class.
+
+        The percentages are those of `PERCENT`; what neither map knows is unknown.
+        """
+        percent = np.full(len(Change), UNKNOWN, np.int8)
+        percent[list(PERCENT)] = list(PERCENT.values())
+        return replace(self.old, cells=percent[self.classes], stamp=self.new.stamp)
+
     def updated(self) -> OccupancyGrid:
         """Return the earlier map with what changed and what was newly explored carried into it.
 
@@ -101,7 +127,7 @@ def diff(
     parameters: object | None = None,
     tolerance: float = TOLERANCE,
     max_bend: float = MAX_BEND,
-    least_area: float = LEAST_AREA,
+    min_area: float = MIN_AREA,
 ) -> MapDiff:
     """Find what changed between an earlier and a later map of one place.
 
@@ -120,7 +146,7 @@ def diff(
         An obstacle this near [m] to one of the other map is that one. At least two cells are taken.
     max_bend
         How far [m] any part of the later map may be bent; 0 compares it as it is.
-    least_area
+    min_area
         Changed area [m^2] below which a group of cells is speckle, not a change.
 
     Raises
@@ -132,7 +158,7 @@ def diff(
     UnknownMethodError
         There is no such method.
     """
-    for name, value in (("tolerance", tolerance), ("max_bend", max_bend), ("least_area", least_area)):
+    for name, value in (("tolerance", tolerance), ("max_bend", max_bend), ("min_area", min_area)):
         if not (math.isfinite(value) and value >= 0):
             raise ValueError(f"{name} must be a number from 0 on, not {value}")
     check_resolutions(old, new)
@@ -149,6 +175,6 @@ def diff(
     # Nothing is drawn more exactly than the coarser cells allow.
     tolerance = max(tolerance, 2 * max(old.resolution, new.resolution))
     classes = classify(lattice, laid, tolerance)
-    regions, classes = find_regions(classes, lattice, least_area, GAP)
+    regions, classes = find_regions(classes, lattice, min_area, GAP)
     classes.flags.writeable = False
     return MapDiff(classes, lattice, laid, T_old_new, result, bending.greatest, regions)

@@ -141,7 +141,7 @@ def _on_nodes(bending: Bending, low: complex, size: complex, spacing: float) -> 
     """Return the same bending on a lattice of nodes over the box from `low` on."""
     cols, rows = (max(2, math.ceil(side / spacing) + 1) for side in (size.real, size.imag))
     col, row = np.meshgrid(np.arange(cols), np.arange(rows))
-    places = low + spacing * (col + 1j * row)
+    places = np.asarray(low + spacing * (col + 1j * row), np.complex128)
     return replace(bending, corner=low, spacing=spacing, nodes=bending.at(places))
 
 
@@ -187,9 +187,8 @@ def _springs(rows: int, cols: int, stiffness: float) -> csr_array:
     """Return the matrix of the energy of springs between neighbouring nodes, for x and then for y."""
     count = rows * cols
     node = np.arange(count).reshape(rows, cols)
-    one, other = (
-        np.concatenate([f.ravel(), g.ravel()]) for f, g in ((node[:, :-1], node[:-1]), (node[:, 1:], node[1:]))
-    )
+    one = np.concatenate([node[:, :-1].ravel(), node[:-1].ravel()])
+    other = np.concatenate([node[:, 1:].ravel(), node[1:].ravel()])
     one, other = (np.concatenate([n, n + count]) for n in (one, other))
     diagonal = stiffness * np.bincount(np.concatenate([one, other]), minlength=2 * count) + _REST
     every = np.arange(2 * count)

@@ -45,4 +45,4 @@ def outline(mask: Mask) -> Vertices:
         corners.append(corner)
     ring = np.array(corners, np.intp)
     way_in, way_out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
-    return ring[(way_in != way_out).any(axis=1)]
+    return np.asarray(ring[(way_in != way_out).any(axis=1)])

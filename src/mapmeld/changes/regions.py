@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -49,7 +49,7 @@ class Region:
 
 
 def find_regions(
-    classes: Classes, lattice: OccupancyGrid, least_area: float, gap: float
+    classes: Classes, lattice: OccupancyGrid, min_area: float, gap: float
 ) -> tuple[tuple[Region, ...], Classes]:
     """Group the changed cells; what is too small to be a change is none.
 
@@ -57,7 +57,7 @@ def find_regions(
     ----------
     classes, lattice
         A `Change` for each cell, and the lattice that they lie on; its cells are not read.
-    least_area
+    min_area
         Changed area [m^2] below which a group is speckle.
     gap
         Changed cells of one kind with at most this [m] between them, from centre to centre, belong together.
@@ -72,7 +72,7 @@ def find_regions(
     found: list[Region] = []
     cleaned = classes.copy()
     reach = gap / lattice.resolution
-    least = least_area / lattice.resolution**2
+    least = min_area / lattice.resolution**2
     for kind, change in KINDS.items():
         for corner, cells in _groups(classes == change, reach):
             count = int(np.count_nonzero(cells))
@@ -86,9 +86,7 @@ def find_regions(
     return tuple(found), cleaned
 
 
-def _region(
-    kind: Kind, cells: Mask, corner: tuple[int, int], lattice: OccupancyGrid, reach: float
-) -> Region:
+def _region(kind: Kind, cells: Mask, corner: tuple[int, int], lattice: OccupancyGrid, reach: float) -> Region:
     rows, cols = np.nonzero(cells)
     middle = lattice.lattice_to_metres(np.array([cols.mean(), rows.mean()]) + 0.5 + corner)
     ring = lattice.lattice_to_metres(outline(_joined(cells, reach)) + corner)
@@ -115,7 +113,7 @@ def _groups(mask: Mask, reach: float) -> Iterator[tuple[tuple[int, int], Mask]]:
         yield (place[1].start, place[0].start), groups[place] == number
 
 
-def _links(parts: NDArray[np.int32], reach: float) -> NDArray[np.intp]:
+def _links(parts: NDArray[np.signedinteger[Any]], reach: float) -> NDArray[np.intp]:
     """Return the shortest links between neighbouring parts, at most `reach` cells long.
 
     Parts are neighbours where the places nearest to one meet those nearest to the other.
