@@ -21,10 +21,10 @@ TOLERANCE = 0.2
 """[m]; what local bending leaves of drift, and walls drawn by other scans."""
 MAX_BEND = 0.5
 """[m]; real maps of a floor bend by up to some 0.4 m."""
-MIN_AREA = 0.02
-"""[m^2]; the legs of one chair, eight cells of 0.05 m."""
-GAP = 0.3
-"""[m]; cells of one kind nearer than this belong to one change."""
+MIN_AREA = 0.0075
+"""[m^2]; three cells of 0.05 m: a table's leg."""
+GAP = 0.4
+"""[m]; cells of one kind nearer than this, as the legs of a chair are, belong to one change."""
 
 PERCENT: Mapping[Change, int] = {
     Change.SAME: 0,
@@ -147,7 +147,7 @@ def diff(
     max_bend
         How far [m] any part of the later map may be bent; 0 compares it as it is.
     min_area
-        Changed area [m^2] below which a group of cells is speckle, not a change.
+        Changed area [m^2] below which a group of cells is speckle, not a change; a single cell always is.
 
     Raises
     ------

@@ -58,7 +58,7 @@ def find_regions(
     classes, lattice
         A `Change` for each cell, and the lattice that they lie on; its cells are not read.
     min_area
-        Changed area [m^2] below which a group is speckle.
+        Changed area [m^2] below which a group is speckle; a single cell always is.
     gap
         Changed cells of one kind with at most this [m] between them, from centre to centre, belong together.
 
@@ -72,12 +72,12 @@ def find_regions(
     found: list[Region] = []
     cleaned = classes.copy()
     reach = gap / lattice.resolution
-    least = min_area / lattice.resolution**2
+    # A hair less, lest rounding decide about an area that is exactly the least.
+    least = max(min_area / lattice.resolution**2 - 1e-6, 2)
     for kind, change in KINDS.items():
         for corner, cells in _groups(classes == change, reach):
             count = int(np.count_nonzero(cells))
-            # A hair less, lest rounding decide about an area that is exactly the least.
-            if count < least - 1e-6:
+            if count < least:
                 row, col = np.nonzero(cells)
                 cleaned[row + corner[1], col + corner[0]] = Change.SAME
             else:

@@ -56,7 +56,7 @@ def diff(
     ] = 0.5,
     min_area: Annotated[
         float, typer.Option(metavar="M2", min=0, help="Changes of less area are speckle and left out.")
-    ] = 0.02,
+    ] = 0.0075,
     transform: Transform = None,
     force: Force = False,
     json: Json = False,
