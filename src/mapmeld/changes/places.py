@@ -126,7 +126,10 @@ def _written(value: float) -> str:
 def _quoted(name: str) -> str:
     plain = re.fullmatch(r"[A-Za-z][\w-]*", name, re.ASCII) is not None
     word = name.lower() in ("null", "true", "false", "yes", "no", "on", "off", "y", "n")
-    return name if plain and not word else json.dumps(name)
+    if plain and not word:
+        return name
+    text = json.dumps(name, ensure_ascii=False)
+    return "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in text)
 
 
 def _place(path: AnyPath, kind: str, number: int, item: Tree) -> Place:
@@ -144,6 +147,8 @@ def _place(path: AnyPath, kind: str, number: int, item: Tree) -> Place:
     if called is not None and not isinstance(called, Scalar):
         _fail(path, f"{where} has a name that is not a text")
     name = None if called is None else called.value
+    if name is not None and any("\ud800" <= c <= "\udfff" for c in name):
+        _fail(path, f"{where} has a name that is not Unicode text")
     if kind == "polygons":
         corners = item["points"]
         if not isinstance(corners, list) or len(corners) < 3:
