@@ -418,7 +418,7 @@ def write_all(out: Path, seed: int, force: bool) -> None:
     text = (
         "# T_a_b takes a point of robot b's map into robot a's: [x m, y m, theta rad].\n"
         "# Start poses are in the building's frame; each is the origin of that robot's map.\n"
-        "# Later, robot 1 mapped the floor again; what was moved is gone and came: middles in its first map.\n"
+        "# Later, robot 1 mapped the floor again; what was moved is in both: middles in its first map.\n"
         + yaml.safe_dump(truth(TOURS), default_flow_style=None, sort_keys=False)
     )
     write_files([(out / "truth.yaml", [text.encode()])], force=force)

@@ -51,7 +51,9 @@ cells = arrays(np.int8, (6, 7), elements=st.sampled_from([-1, 0, 20, 50, 80, 100
 
 
 @given(cells, cells, st.floats(0, 4))
-def test_with_roles_swapped_what_appeared_has_vanished(a: np.ndarray, b: np.ndarray, tolerance: float) -> None:
+def test_with_roles_swapped_what_appeared_has_vanished(
+    a: np.ndarray, b: np.ndarray, tolerance: float
+) -> None:
     one, other = OccupancyGrid(a, 1.0), OccupancyGrid(b, 1.0)
     there, back = classify(one, other, tolerance), classify(other, one, tolerance)
     swapped = {

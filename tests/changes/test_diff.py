@@ -142,7 +142,7 @@ def test_updated_keeps_what_was_not_seen_again() -> None:
 
 
 def test_maps_that_do_not_match_are_refused_with_the_reason() -> None:
-    with pytest.raises(NoMatchError, match="rejected: .*") as refused:
+    with pytest.raises(NoMatchError, match="rejected: ") as refused:
         diff(OFFICE, school())
     assert refused.value.match.verdict is Verdict.REJECTED
     with pytest.raises(NoMatchError, match="ambiguous"):

@@ -25,7 +25,11 @@ QUARTER = Pose2(10, 20, math.pi / 2)  # (x, y) -> (10 - y, 20 + x)
         ("MultiPoint", [[1, 2], [0, 0]], [[8.0, 21.0], [10.0, 20.0]]),
         ("LineString", [[1, 2], [0, 0]], [[8.0, 21.0], [10.0, 20.0]]),
         ("MultiLineString", [[[1, 2], [0, 0]], []], [[[8.0, 21.0], [10.0, 20.0]], []]),
-        ("Polygon", [[[1, 2], [0, 0], [1, 0], [1, 2]]], [[[8.0, 21.0], [10.0, 20.0], [10.0, 21.0], [8.0, 21.0]]]),
+        (
+            "Polygon",
+            [[[1, 2], [0, 0], [1, 0], [1, 2]]],
+            [[[8.0, 21.0], [10.0, 20.0], [10.0, 21.0], [8.0, 21.0]]],
+        ),
         ("MultiPolygon", [[[[1, 2, 7]]]], [[[[8.0, 21.0, 7]]]]),
     ],
 )
@@ -70,14 +74,20 @@ def test_features_collections_and_all_else_that_is_in_them() -> None:
 )
 def test_boxes_are_computed_anew(coordinates: Any, box: Any, moved: Any) -> None:
     line = {"type": "LineString", "coordinates": coordinates, "bbox": box}
-    whole = {"type": "FeatureCollection", "bbox": box, "features": [{"type": "Feature", "bbox": box, "geometry": line}]}
+    whole = {
+        "type": "FeatureCollection",
+        "bbox": box,
+        "features": [{"type": "Feature", "bbox": box, "geometry": line}],
+    }
     found = moved_geojson(whole, QUARTER)
     feature = found["features"][0]
     assert found["bbox"] == feature["bbox"] == feature["geometry"]["bbox"] == moved
 
 
 def test_nothing_has_no_box() -> None:
-    assert "bbox" not in moved_geojson({"type": "MultiPoint", "coordinates": [], "bbox": [0, 0, 1, 1]}, QUARTER)
+    assert "bbox" not in moved_geojson(
+        {"type": "MultiPoint", "coordinates": [], "bbox": [0, 0, 1, 1]}, QUARTER
+    )
     assert moved_geojson({"type": "MultiPoint", "coordinates": [], "bbox": None}, QUARTER)["bbox"] is None
 
 
@@ -114,7 +124,10 @@ def test_there_and_back(coordinates: list[list[float]], T: Pose2) -> None:
         ({"type": "Point", "coordinates": [1, 2], "bbox": "here"}, "in place of a bbox"),
         ({"type": "FeatureCollection"}, "without a list of features"),
         ({"type": "FeatureCollection", "features": [3]}, "'3' in place of a Feature"),
-        ({"type": "FeatureCollection", "features": [{"type": "Point", "coordinates": [1, 2]}]}, "place of a Feature"),
+        (
+            {"type": "FeatureCollection", "features": [{"type": "Point", "coordinates": [1, 2]}]},
+            "place of a Feature",
+        ),
         ({"type": "Feature", "geometry": {"type": "Feature", "geometry": None}}, "in place of a geometry"),
         ({"type": "Feature", "geometry": [1, 2]}, "in place of a geometry"),
         ({"type": "GeometryCollection"}, "without a list of geometries"),

@@ -70,9 +70,7 @@ def test_maps_that_lie_far_apart_are_no_trouble() -> None:
     assert np.isfinite(bend_onto(OFFICE, OFFICE, Pose2(300, -400, 1), 0.5).nodes).all()
 
 
-@given(
-    st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-50, 50), st.floats(-50, 50)
-)
+@given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-50, 50), st.floats(-50, 50))
 def test_the_displacement_is_linear_between_nodes_and_held_outside(
     x: float, y: float, at_x: float, at_y: float
 ) -> None:

@@ -42,7 +42,10 @@ def test_points_poses_and_polygons(tmp_path: Path) -> None:
 def test_a_quarter_turn_and_a_shift() -> None:
     T = Pose2(10, 20, math.pi / 2)
     moved = moved_places({"poses": [Place("dock", ((1.0, 2.0),), 3.0)]}, T)
-    assert places_text(moved) == f"poses:\n  - {{name: dock, x: 8.0, y: 21.0, yaw: {round(3 - 1.5 * math.pi, 9)}}}\n"
+    assert (
+        places_text(moved)
+        == f"poses:\n  - {{name: dock, x: 8.0, y: 21.0, yaw: {round(3 - 1.5 * math.pi, 9)}}}\n"
+    )
 
 
 numbers = st.floats(-1e6, 1e6, allow_nan=False)
@@ -61,7 +64,9 @@ all_places = st.fixed_dictionaries(
 
 
 @given(all_places)
-def test_what_is_written_is_read_back(tmp_path_factory: pytest.TempPathFactory, places: dict[str, list[Place]]) -> None:
+def test_what_is_written_is_read_back(
+    tmp_path_factory: pytest.TempPathFactory, places: dict[str, list[Place]]
+) -> None:
     text = places_text(places)
     assert yaml.safe_load(text).keys() == places.keys()
     again = read_places(write(tmp_path_factory.mktemp("p"), text))

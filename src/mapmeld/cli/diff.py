@@ -45,17 +45,24 @@ def diff(
     tolerance: Annotated[
         float,
         typer.Option(
-            metavar="METRES", min=0, help="An obstacle this near to one of the other map is that one."
+            metavar="METRES",
+            min=0,
+            max=100,
+            help="An obstacle this near to one of the other map is that one.",
         ),
     ] = 0.2,
     max_bend: Annotated[
         float,
         typer.Option(
-            metavar="METRES", min=0, help="How far NEW may be bent locally onto OLD; 0 takes it as it is."
+            metavar="METRES",
+            min=0,
+            max=100,
+            help="How far NEW may be bent locally onto OLD; 0 takes it as it is.",
         ),
     ] = 0.5,
     min_area: Annotated[
-        float, typer.Option(metavar="M2", min=0, help="Changes of less area are speckle and left out.")
+        float,
+        typer.Option(metavar="M2", min=0, max=1e6, help="Changes of less area are speckle and left out."),
     ] = 0.0075,
     transform: Transform = None,
     force: Force = False,

@@ -59,23 +59,18 @@ def transform_points(
     from mapmeld.cli.tables import pose_text, print_lines
     from mapmeld.io.atomic import check_targets, write_files
 
+    _check_usage(from_map, to_map, transform)
     carry = _reader(points, out)
     check_targets([out], force=force)
     parameters = effective_parameters(method, params, settings)
-    if from_map is not None and to_map is not None:
-        if transform is None:
-            with working("Matching"):
-                grid_to, grid_from = load_maps([to_map, from_map], resolution)
-                placed = accepted_match(grid_to, grid_from, method, parameters)
-        else:
-            placed = Placement(given_transform(transform, to_map, from_map), None)
-    elif from_map is not None or to_map is not None:
-        raise typer.BadParameter("needs the other map too", param_hint="--from" if from_map else "--to")
-    elif transform is None or Path(transform).suffix.lower() == ".json":
-        hint = "--transform" if transform else "--from"
-        raise typer.BadParameter("needs the names of both maps, --from A --to B", param_hint=hint)
+    if from_map is None or to_map is None:
+        placed = Placement(transform_of_numbers(transform or ""), None)
+    elif transform is not None:
+        placed = Placement(given_transform(transform, to_map, from_map), None)
     else:
-        placed = Placement(transform_of_numbers(transform), None)
+        with working("Matching"):
+            grid_to, grid_from = load_maps([to_map, from_map], resolution)
+            placed = accepted_match(grid_to, grid_from, method, parameters)
     text, count = carry(placed.T_a_b)
     write_files([(out, (text.encode(),))], force=force)
     if json:
@@ -83,6 +78,16 @@ def transform_points(
         typer.echo(as_json(transform_points_fields(placed, parameters, maps, count, [out])))
     else:
         print_lines(f"T_to_from: {pose_text(placed.T_a_b)}", f"Written: {out} ({_counted(count)})")
+
+
+def _check_usage(from_map: str | None, to_map: str | None, transform: str | None) -> None:
+    if from_map is not None and to_map is not None:
+        return
+    if from_map is not None or to_map is not None:
+        raise typer.BadParameter("needs the other map too", param_hint="--from" if from_map else "--to")
+    if transform is None or Path(transform).suffix.lower() == ".json":
+        hint = "--transform" if transform else "--from"
+        raise typer.BadParameter("needs the names of both maps, --from A --to B", param_hint=hint)
 
 
 def _reader(points: Path, out: Path) -> Callable[[Pose2], tuple[str, dict[str, int]]]:
