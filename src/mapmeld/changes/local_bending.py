@@ -40,6 +40,7 @@ _STEPS = (
     (2.0, 0.15, 1.0),
     (2.0, 0.15, 1.0),
 )
+_NO_CELL = 0.01  # of a cell: a displacement that moves nothing
 _REST = 1e-3  # weight of "where nothing says otherwise, nothing moves"
 _MOST_NODES = 20_000  # very large maps get wider spaced nodes
 
@@ -77,7 +78,7 @@ class Bending:
 
     def laid(self, new: OccupancyGrid, T_old_new: Pose2, lattice: OccupancyGrid) -> Cells:
         """Return the cells of the later map, laid down and bent, on a lattice of the earlier map's frame."""
-        if not self.greatest:
+        if self.greatest < _NO_CELL * lattice.resolution:
             return resample(new, T_old_new, lattice)
         T = self.frame.inverse() @ lattice.origin
         turn = cmath.exp(1j * T.theta)
