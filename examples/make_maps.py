@@ -4,7 +4,8 @@
 
 Three robots start at different places and headings, drive through rooms and corridors, and turn
 what a noisy laser sees into an occupancy grid by log-odds. The pose each of them believes in
-drifts a little, so walls fray and no two maps are the same. A fourth map shows another building.
+drifts a little, so walls fray and no two maps are the same. A fourth map shows another building,
+and a fifth the office again, some months and some moved furniture later.
 ``truth.yaml`` says how the maps really fit. The same seed gives the same files.
 """
 
@@ -14,7 +15,7 @@ import argparse
 import math
 import sys
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from pathlib import Path
 
@@ -186,6 +187,22 @@ OTHER_TOUR = Tour(
      (6.9, 10.8), (6.9, 8.6), (9.4, 5.8), (9.4, 3.8), (9.4, 5.8), (10.6, 10.8), (12.4, 7.2), (13.5, 5.0),
      (13.5, 6.8)),
 )  # fmt: skip
+
+# The office some months later, and robot 1 there again, from another start and one room further. What was
+# carried away, and what came; what was moved is in both.
+GONE_BOXES = ((3.9, 11.2, 0.7, 0.7, 30), (14.4, 4.3, 0.4, 2.0, 0))
+CAME_BOXES = ((1.6, 10.9, 1.6, 0.7, 20), (3.6, 0.4, 1.0, 0.6, 0), (13.4, 6.5, 0.8, 0.4, 0))
+GONE_TABLES = ((2.6, 3.4, 1.6, 0.8, 8), (11.6, 2.6, 2.8, 1.2, -12))
+CAME_TABLES = ((1.7, 3.1, 1.6, 0.8, 98), (11.6, 2.6, 2.8, 1.2, 70))
+GONE_CHAIRS = ((2.7, 4.2, 15), (10.6, 3.8, -30))
+CAME_CHAIRS = ((2.6, 3.0, 95),)
+LATER = replace(
+    OFFICE,
+    boxes=tuple(b for b in OFFICE.boxes if b not in GONE_BOXES) + CAME_BOXES,
+    tables=tuple(t for t in OFFICE.tables if t not in GONE_TABLES) + CAME_TABLES,
+    chairs=tuple(c for c in OFFICE.chairs if c not in GONE_CHAIRS) + CAME_CHAIRS,
+)
+LATER_TOUR = Tour(Pose2(5.0, 7.1, -2.6), (*TOURS["robot_1"].stops, (9.7, 9.6), (11.6, 9.6), (9.7, 9.6)))
 
 
 # ---------------------------------------------------------------------- the floor plan
@@ -368,6 +385,7 @@ def map_jobs(seed: int) -> dict[str, tuple[Building, Tour, np.random.Generator]]
     Each robot has a stream of numbers of its own: changing one tour leaves the other maps as they are.
     """
     jobs = [(name, OFFICE, tour) for name, tour in TOURS.items()] + [("other_building", OTHER, OTHER_TOUR)]
+    jobs.append(("robot_1_later", LATER, LATER_TOUR))
     return {
         name: (building, tour, np.random.default_rng((seed, number)))
         for number, (name, building, tour) in enumerate(jobs)
@@ -386,7 +404,26 @@ def truth(tours: dict[str, Tour]) -> dict[str, object]:
         f"T_{a.split('_')[1]}_{b.split('_')[1]}": numbers(starts[a].inverse() @ starts[b])
         for a, b in combinations(starts, 2)
     }
-    return {"transforms": between, "start_poses": {name: numbers(pose) for name, pose in starts.items()}}
+    return {
+        "transforms": between,
+        "start_poses": {name: numbers(pose) for name, pose in starts.items()},
+        "later": later_truth(),
+    }
+
+
+def later_truth() -> dict[str, object]:
+    """Return how robot 1's later map lies on its first one, and what of the furniture came and went."""
+    T_1_later = TOURS["robot_1"].start.inverse() @ LATER_TOUR.start
+
+    def centres(*kinds: Iterable[tuple[float, ...]]) -> list[list[float]]:
+        places = [(x, y) for kind in kinds for x, y, *_ in kind]
+        return [[round(float(v), 3) for v in TOURS["robot_1"].start.inverse().apply(p)] for p in places]
+
+    return {
+        "T_1_later": [round(value, 9) for value in (T_1_later.x, T_1_later.y, T_1_later.theta)],
+        "gone": centres(GONE_BOXES, GONE_TABLES, GONE_CHAIRS),
+        "came": centres(CAME_BOXES, CAME_TABLES, CAME_CHAIRS),
+    }
 
 
 def write_all(out: Path, seed: int, force: bool) -> None:
@@ -401,6 +438,7 @@ def write_all(out: Path, seed: int, force: bool) -> None:
     text = (
         "# T_a_b takes a point of robot b's map into robot a's: [x m, y m, theta rad].\n"
         "# Start poses are in the building's frame; each is the origin of that robot's map.\n"
+        "# Later, robot 1 mapped the floor again; what was moved is in both: middles in its first map.\n"
         + yaml.safe_dump(truth(TOURS), default_flow_style=None, sort_keys=False)
     )
     write_files([(out / "truth.yaml", [text.encode()])], force=force)

@@ -6,6 +6,7 @@ from drawing import drawn, office, picture_of, seen_from
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
 
 import mapmeld
 from mapmeld.grid import OccupancyGrid, ResolutionError, at_resolution, overlap_share, resample
@@ -271,3 +272,16 @@ def test_overlap_does_not_depend_on_the_frames(T_a: Pose2, T_b: Pose2) -> None:
 # ------------------------------------------------------------------ pictures
 def test_pictures_are_grey_as_in_the_paper_with_the_top_row_first() -> None:
     assert drawn("#. \n...").to_image().tolist() == [[0, 254, 205], [254, 254, 254]]
+
+
+def test_what_is_displaced_is_taken_from_where_it_came_from() -> None:
+    grid = drawn("#....\n.#...\n..#..")
+
+    def displacement(col: NDArray[np.float64], row: NDArray[np.float64]) -> NDArray[np.complex128]:
+        # Everything comes from a cell to the left, the middle row from the row above as well.
+        return np.where((row > 1) & (row < 2), 1 - 1j, 1.0).astype(np.complex128)
+
+    moved = resample(grid, Pose2(), grid, displacement=displacement)
+    assert picture_of(OccupancyGrid(moved, 1.0)) == " #...\n #...\n ..#."
+    still = resample(grid, Pose2(), grid, displacement=lambda col, row: np.zeros(col.shape, np.complex128))
+    np.testing.assert_array_equal(still, grid.cells)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from mapmeld.changes import MapDiff, diff
     from mapmeld.errors import MapmeldError
     from mapmeld.grid import OccupancyGrid
     from mapmeld.io import load, save
@@ -22,12 +23,14 @@ if TYPE_CHECKING:
 
 # Resolved on first use, so that importing mapmeld (and `mapmeld --help`) does not import OpenCV.
 _HOMES = {
+    "MapDiff": "mapmeld.changes",
     "MapmeldError": "mapmeld.errors",
     "MatchResult": "mapmeld.matching",
     "MergeResult": "mapmeld.merging",
     "OccupancyGrid": "mapmeld.grid",
     "Pose2": "mapmeld.se2",
     "Verdict": "mapmeld.matching",
+    "diff": "mapmeld.changes",
     "load": "mapmeld.io",
     "match": "mapmeld.matching",
     "merge": "mapmeld.merging",
@@ -35,6 +38,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "MapDiff",
     "MapmeldError",
     "MatchResult",
     "MergeResult",
@@ -42,6 +46,7 @@ __all__ = [
     "Pose2",
     "Verdict",
     "__version__",
+    "diff",
     "load",
     "match",
     "merge",

@@ -13,6 +13,7 @@ Conventions, used everywhere in mapmeld:
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -213,7 +214,12 @@ _BLOCK_CELLS = 1 << 20
 
 
 def resample(
-    grid: OccupancyGrid, T_target_grid: Pose2, target: OccupancyGrid, *, keep: str = "walls"
+    grid: OccupancyGrid,
+    T_target_grid: Pose2,
+    target: OccupancyGrid,
+    *,
+    keep: str = "walls",
+    displacement: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.complex128]] | None = None,
 ) -> Cells:
     """Sample `grid`, laid down by `T_target_grid`, on the lattice of `target`.
 
@@ -230,6 +236,9 @@ def resample(
         Takes a point of the grid's metric frame into the target's.
     target
         Supplies shape, resolution and origin; its cells are not read.
+    displacement
+        If given, bends the grid: takes positions (cols, rows) on the target's lattice, and what belongs
+        there is taken from where the displacement, (col + 1j * row), would have brought it from.
 
     Returns
     -------
@@ -263,8 +272,12 @@ def resample(
         total = np.zeros(best.shape, np.int32)
         count = np.zeros(best.shape, np.int32)
         for du, dv in offsets:
-            col = np.floor(c * (u + du) - s * (v + dv) + tx).astype(np.int64)
-            row = np.floor(s * (u + du) + c * (v + dv) + ty).astype(np.int64)
+            x, y = u + du, v + dv
+            if displacement is not None:
+                shift = displacement(*np.broadcast_arrays(x, y))
+                x, y = x - shift.real, y - shift.imag
+            col = np.floor(c * x - s * y + tx).astype(np.int64)
+            row = np.floor(s * x + c * y + ty).astype(np.int64)
             inside = (col >= 0) & (col < width) & (row >= 0) & (row < height)
             value = np.full(best.shape, UNKNOWN, np.int8)
             value[inside] = grid.cells[row[inside], col[inside]]

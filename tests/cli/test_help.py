@@ -6,12 +6,24 @@ import pytest
 from running import run, run_for_real
 
 import mapmeld
+from mapmeld.changes.diff import MAX_BEND, MIN_AREA, TOLERANCE
 from mapmeld.cli.options import DEFAULT_METHOD, Fusion, WriteMode
 from mapmeld.io import Mode
 from mapmeld.matching import DEFAULT_METHOD as THE_DEFAULT_METHOD
 from mapmeld.merging import FUSIONS
 
-COMMANDS = ("match", "merge", "show", "explain", "demo", "benchmark", "bag")
+COMMANDS = (
+    "match",
+    "merge",
+    "diff",
+    "rebase",
+    "transform-points",
+    "show",
+    "explain",
+    "demo",
+    "benchmark",
+    "bag",
+)
 
 
 def test_help_names_every_command_and_the_exit_codes() -> None:
@@ -22,7 +34,7 @@ def test_help_names_every_command_and_the_exit_codes() -> None:
     assert all(f"{code} " in outcome.out for code in (0, 1, 2, 70, 130, 141))
 
 
-@pytest.mark.parametrize("command", ["match", "merge", "show"])
+@pytest.mark.parametrize("command", ["match", "merge", "diff", "rebase", "transform-points", "show"])
 def test_help_names_the_default_method_and_the_way_to_its_settings(command: str) -> None:
     words = " ".join(run(command, "--help").out.replace("│", " ").split())
     assert f"[default: {DEFAULT_METHOD}]" in words
@@ -77,6 +89,9 @@ def test_without_a_command_there_is_help_and_exit_code_2(tmp_path: Path) -> None
         (["merge", "a.yaml", "b.yaml", "-o", "m.yaml", "--fusion", "glue"], "colour"),
         (["merge", "a.yaml", "b.yaml", "-o", "m.yaml", "--mode", "fancy"], "trinary"),
         (["show", "a.yaml", "-o", "p.png", "--transform", "1,2,3"], "second map"),
+        (["diff", "a.yaml", "b.yaml"], "--out"),
+        (["rebase", "a.yaml", "-o", "m.yaml"], "--onto"),
+        (["transform-points", "p.yaml", "-o", "o.yaml"], "--from"),
     ],
 )
 def test_wrong_usage_is_one_line_and_exit_code_2(
@@ -96,3 +111,5 @@ def test_what_help_lists_is_what_there_is() -> None:
     assert DEFAULT_METHOD == THE_DEFAULT_METHOD
     assert [str(f) for f in Fusion] == list(FUSIONS)
     assert [str(m) for m in WriteMode] == list(Mode.__args__)  # type: ignore[attr-defined]
+    words = " ".join(run("diff", "--help").out.replace("│", " ").split())
+    assert all(f"[default: {value:g}]" in words for value in (TOLERANCE, MAX_BEND, MIN_AREA))

@@ -7,6 +7,7 @@ import math
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,6 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from mapmeld.changes import Change, diff
 from mapmeld.grid import FREE, OCCUPIED, OccupancyGrid
 from mapmeld.io import load
 from mapmeld.se2 import Pose2
@@ -200,8 +202,8 @@ def _walls_off(a: OccupancyGrid, b: OccupancyGrid, T_a_b: Pose2) -> NDArray[np.f
     return np.asarray(away[rows, cols][a.known[rows, cols]], np.float64)
 
 
-def _shipped_truth() -> dict[str, dict[str, list[float]]]:
-    content: dict[str, dict[str, list[float]]] = yaml.safe_load((MAPS / "truth.yaml").read_text())
+def _shipped_truth() -> dict[str, Any]:
+    content: dict[str, Any] = yaml.safe_load((MAPS / "truth.yaml").read_text())
     return content
 
 
@@ -223,3 +225,21 @@ def test_shipped_truth_is_that_of_the_tours() -> None:
 
 def test_shipped_maps_are_small() -> None:
     assert sum(file.stat().st_size for file in MAPS.iterdir()) < 1_000_000
+
+
+# ---------------------------------------------------------------- the later map
+def test_what_changed_is_what_came_and_went() -> None:
+    later = _shipped_truth()["later"]
+    T = Pose2(*later["T_1_later"])
+    found = diff(load(MAPS / "robot_1.yaml"), load(MAPS / "robot_1_later.yaml"))
+    metres, radians = found.T_old_new.distance_to(T)
+    assert metres < 0.15
+    assert radians < math.radians(1)
+    for kind, places in (("appeared", later["came"]), ("vanished", later["gone"])):
+        of_kind = [region for region in found.regions if region.kind == kind]
+        # Every change is near something that came or went; the longest table reaches 1.5 m from its middle.
+        for region in of_kind:
+            assert min(math.dist(region.centroid, place) for place in places) < 1.6
+        for place in places:
+            assert min(math.dist(region.centroid, place) for region in of_kind) < 1.6
+    assert found.area(Change.EXPLORED) > 10

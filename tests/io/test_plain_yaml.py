@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from mapmeld.io import MapFileError
-from mapmeld.io.plain_yaml import Nested, Scalar, read_fields, short
+from mapmeld.io.plain_yaml import Nested, Scalar, read_fields, read_tree, short
 
 
 def write(folder: Path, text: str) -> Path:
@@ -47,3 +47,35 @@ def test_how_deep_it_may_be(tmp_path: Path) -> None:
 def test_a_long_text_is_cut_in_messages() -> None:
     assert short("a" * 40) == repr("a" * 40)
     assert short("a" * 41) == repr("a" * 37 + "...")
+
+
+# ---------------------------------------------------------------------- with all that is nested
+def test_a_tree_holds_everything(tmp_path: Path) -> None:
+    file = write(tmp_path, "a: [1, {b: [], c: 'x'}]\nd: {e: {f: 2}}\ng:\n")
+    one, two, x, nothing = (Scalar(v, quoted=v == "x") for v in ("1", "2", "x", ""))
+    assert read_tree(file, "a file", depth=9, max_bytes=99) == {
+        "a": [one, {"b": [], "c": x}],
+        "d": {"e": {"f": two}},
+        "g": nothing,
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a: [[[1]]]", "more than 3 levels"),
+        ("a: {b: 1, b: 2}", "'b' twice"),
+        ("a: {[1]: 2}", "no plain word"),
+        ("a: &x [1]\nb: *x", "anchor"),
+        ("a: !!set {}", "tag"),
+        ("a: 1\n---\nb: 2", "second document"),
+        ("a: 1" + " " * 99, "too large"),
+        ("", "is empty"),
+        ("# nothing", "no 'key: value' lines"),
+        ("[1]", "no 'key: value' lines"),
+        ("a: [1", "not valid YAML"),
+    ],
+)
+def test_a_tree_that_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(MapFileError, match=said):
+        read_tree(write(tmp_path, text), "a file", depth=3, max_bytes=99)

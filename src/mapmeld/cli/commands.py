@@ -19,11 +19,14 @@ from mapmeld import __version__
 from mapmeld.cli.bag import bag
 from mapmeld.cli.benchmark import benchmark
 from mapmeld.cli.demo import demo
+from mapmeld.cli.diff import diff
 from mapmeld.cli.errors import BAD_INPUT, CLOSED_PIPE, FAULT, INTERRUPTED, NO_MATCH, say
 from mapmeld.cli.explain import explain
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
+from mapmeld.cli.rebase import rebase
 from mapmeld.cli.show import show
+from mapmeld.cli.transform_points import transform_points
 from mapmeld.errors import MapmeldError
 
 # The class that all complaints about the command line derive from, under the name by which it can be
@@ -146,6 +149,6 @@ def _options(
     pass
 
 
-for _command in (match, merge, show, explain, demo, benchmark):
+for _command in (match, merge, diff, rebase, transform_points, show, explain, demo, benchmark):
     app.command()(_command)
 app.add_typer(bag)

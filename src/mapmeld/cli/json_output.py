@@ -13,8 +13,12 @@ from typing import TYPE_CHECKING, Any
 from mapmeld import __version__
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
+    from mapmeld.changes import MapDiff
+    from mapmeld.cli.placement import Placement
+    from mapmeld.grid import OccupancyGrid
     from mapmeld.io.recordings import RecordingInfo
     from mapmeld.matching import MatchResult
     from mapmeld.merging import MergeResult
@@ -23,6 +27,9 @@ if TYPE_CHECKING:
 MATCH_SCHEMA = "mapmeld.match/1"
 MERGE_SCHEMA = "mapmeld.merge/1"
 BAG_INFO_SCHEMA = "mapmeld.bag.info/1"
+DIFF_SCHEMA = "mapmeld.diff/1"
+REBASE_SCHEMA = "mapmeld.rebase/1"
+TRANSFORM_POINTS_SCHEMA = "mapmeld.transform-points/1"
 
 Fields = dict[str, Any]
 
@@ -121,6 +128,91 @@ def bag_info_fields(info: RecordingInfo, path: str) -> Fields:
         ],
         "left_out": info.left_out,
     }
+
+
+def diff_fields(
+    diff: MapDiff | None,
+    match: MatchResult | None,
+    parameters: Any,
+    paths: Sequence[str],
+    files: Sequence[Path],
+    seconds: float,
+) -> Fields:
+    """Return the fields of schema mapmeld.diff/1; without a diff those of maps that do not match."""
+    from mapmeld.changes import Change
+
+    return {
+        "schema": DIFF_SCHEMA,
+        "mapmeld": __version__,
+        "maps": {"old": paths[0], "new": paths[1]},
+        "T_old_new": None if diff is None else pose_fields(diff.T_old_new),
+        "match": _how_matched(match, parameters),
+        "bend": None if diff is None else diff.bend,
+        "areas": None
+        if diff is None
+        else {change.name.lower(): diff.area(change) for change in Change if change is not Change.UNKNOWN},
+        "regions": []
+        if diff is None
+        else [
+            {
+                "kind": region.kind,
+                "area": region.area_m2,
+                "centroid": list(region.centroid),
+                "bounds": list(region.bounds),
+            }
+            for region in diff.regions
+        ],
+        "summary": None if diff is None else diff.summary,
+        "files": [str(file) for file in files],
+        "seconds": seconds,
+    }
+
+
+def rebase_fields(
+    placed: Placement,
+    parameters: Any,
+    paths: Sequence[str],
+    moved: OccupancyGrid,
+    lattice: bool,
+    files: Sequence[Path],
+) -> Fields:
+    """Return the fields of schema mapmeld.rebase/1."""
+    return {
+        "schema": REBASE_SCHEMA,
+        "mapmeld": __version__,
+        "maps": {"old": paths[0], "new": paths[1]},
+        "T_old_new": pose_fields(placed.T_a_b),
+        "match": _how_matched(placed.match, parameters),
+        "lattice": lattice,
+        "origin": pose_fields(moved.origin),
+        "files": [str(file) for file in files],
+    }
+
+
+def transform_points_fields(
+    placed: Placement,
+    parameters: Any,
+    maps: tuple[str | None, str | None],
+    count: Mapping[str, int],
+    files: Sequence[Path],
+) -> Fields:
+    """Return the fields of schema mapmeld.transform-points/1."""
+    return {
+        "schema": TRANSFORM_POINTS_SCHEMA,
+        "mapmeld": __version__,
+        "maps": {"from": maps[0], "to": maps[1]},
+        "T_to_from": pose_fields(placed.T_a_b),
+        "match": _how_matched(placed.match, parameters),
+        "count": dict(count),
+        "files": [str(file) for file in files],
+    }
+
+
+def _how_matched(match: MatchResult | None, parameters: Any) -> Fields | None:
+    """Return how maps were matched and what came of it; None for a transform that was given."""
+    if match is None:
+        return None
+    return {"method": match.method, "parameters": asdict(parameters), **_evidence(match)}
 
 
 def _evidence(result: MatchResult) -> Fields:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from mapmeld.grid import OccupancyGrid
+    from mapmeld.io import Mode
 
 
 def load_maps(paths: Sequence[str], resolution: float | None) -> list[OccupancyGrid]:
@@ -64,3 +65,30 @@ def same_map(path: str) -> str:
 
     file, rest = split_address(path)
     return os.path.realpath(file) + ("" if rest is None else f"#{rest}")
+
+
+def check_map_path(out: Path, *, force: bool) -> None:
+    """Find out before the work that a map cannot be written under a name.
+
+    Raises
+    ------
+    MapFileError
+        The name does not end as a map's, or its files exist (and `force` is not set).
+    """
+    from mapmeld.io import MapFileError
+    from mapmeld.io.atomic import check_targets
+
+    if out.suffix.lower() not in (".yaml", ".yml"):
+        raise MapFileError.of(
+            out, "a map is written as a .yaml file with an image beside it; end it in .yaml"
+        )
+    check_targets([out, out.with_suffix(".pgm")], force=force)
+
+
+def exact_mode(grid: OccupancyGrid) -> Mode:
+    """Return the mode of a map file that loses nothing: "trinary" where there are no percentages."""
+    import numpy as np
+
+    from mapmeld.grid import FREE, OCCUPIED, UNKNOWN
+
+    return "trinary" if np.isin(grid.cells, (UNKNOWN, FREE, OCCUPIED)).all() else "scale"

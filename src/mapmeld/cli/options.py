@@ -21,6 +21,10 @@ MapA = Annotated[
 ]
 MapB = Annotated[str, typer.Argument(metavar="B", help="The map to lay on A.")]
 
+Old = Annotated[str, typer.Argument(metavar="OLD", help="The earlier map, in any form that A can have.")]
+New = Annotated[str, typer.Argument(metavar="NEW", help="The later map.")]
+MapOut = Annotated[Path, typer.Option("-o", "--out", metavar="YAML", help="The map to write.")]
+
 Method = Annotated[
     str, typer.Option("--method", metavar="NAME", help="How to match; a wrong name makes it list them all.")
 ]
@@ -39,6 +43,15 @@ Settings = Annotated[
 Resolution = Annotated[
     float | None,
     typer.Option("--resolution", metavar="METRES", help="Side of a cell in maps that are bare images."),
+]
+Transform = Annotated[
+    str | None,
+    typer.Option(
+        "--transform",
+        metavar="X,Y,DEG | FILE.json",
+        help="How the second map lies on the first, instead of matching them: metres and degrees, or the "
+        "answer of 'mapmeld match --json' for these maps.",
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead (see docs/json.md).")]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]

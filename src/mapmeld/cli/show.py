@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mapmeld.cli.errors import NO_MATCH, say
 from mapmeld.cli.options import (
     DEFAULT_METHOD,
     Force,
@@ -17,22 +15,19 @@ from mapmeld.cli.options import (
     PictureOut,
     Resolution,
     Settings,
+    Transform,
 )
 
 if TYPE_CHECKING:
     from mapmeld.grid import OccupancyGrid
     from mapmeld.report import Picture
-    from mapmeld.se2 import Pose2
 
 
 def show(
     a: MapA,
     out: PictureOut,
     b: Annotated[str | None, typer.Argument(metavar="[B]", help="A map to lay over A.")] = None,
-    transform: Annotated[
-        str | None,
-        typer.Option(metavar="X,Y,DEG", help="How B lies on A: metres, degrees. If not given, B is matched."),
-    ] = None,
+    transform: Transform = None,
     force: Force = False,
     method: Method = DEFAULT_METHOD,
     params: ParamsFile = None,
@@ -45,6 +40,7 @@ def show(
     """
     from mapmeld.cli.maps import load_maps, names_of
     from mapmeld.cli.parameters import effective_parameters
+    from mapmeld.cli.placement import accepted_match, given_transform
     from mapmeld.cli.progress import working
     from mapmeld.cli.tables import pose_text, print_lines
     from mapmeld.report import check_picture_path, overlay, write_picture
@@ -52,7 +48,6 @@ def show(
 
     check_picture_path(out, force=force)
     parameters = effective_parameters(method, params, settings)
-    given = None if transform is None else _read_transform(transform)
     if b is None:
         if transform is not None:
             raise typer.BadParameter("needs a second map, B", param_hint="--transform")
@@ -61,37 +56,14 @@ def show(
             write_picture(_single(grid, *names_of([a])), out, force=force)
         print_lines(f"Written: {out}")
         return
+    given = None if transform is None else given_transform(transform, a, b)
     with working("Drawing" if given else "Matching and drawing"):
         grid_a, grid_b = load_maps([a, b], resolution)
-        T_a_b = given or _matched(grid_a, grid_b, method, parameters)
+        T_a_b = given or accepted_match(grid_a, grid_b, method, parameters).T_a_b
         names = [f"{letter}: {name}" for letter, name in zip("ab", names_of([a, b]), strict=True)]
         caption = f"Map b lies on map a at {pose_text(T_a_b)}{' (given)' if given else ''}."
         write_picture(overlay([grid_a, grid_b], [Pose2(), T_a_b], names, caption), out, force=force)
     print_lines(f"T_a_b: {pose_text(T_a_b)}", f"Written: {out}")
-
-
-def _matched(a: OccupancyGrid, b: OccupancyGrid, method: str, parameters: object) -> Pose2:
-    from mapmeld.matching import Verdict, match
-
-    result = match(a, b, method, parameters)
-    if result.verdict is not Verdict.ACCEPTED or result.T_a_b is None:
-        say(f"{result.verdict}: {result.reason}; nothing written (--transform lays B down as you say)")
-        raise typer.Exit(NO_MATCH)
-    return result.T_a_b
-
-
-def _read_transform(text: str) -> Pose2:
-    from mapmeld.se2 import Pose2
-
-    try:
-        x, y, degrees = (float(part) for part in text.split(","))
-        if not all(map(math.isfinite, (x, y, degrees))):
-            raise ValueError
-    except ValueError:
-        raise typer.BadParameter(
-            f"three numbers x,y,degrees are needed, not {text!r}", param_hint="--transform"
-        ) from None
-    return Pose2(x, y, math.radians(degrees))
 
 
 def _single(grid: OccupancyGrid, name: str) -> Picture:

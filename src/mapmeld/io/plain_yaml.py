@@ -6,15 +6,17 @@ neither run anything nor grow without end; what is too large or too deep stops t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, NoReturn, TypeVar
 
 from mapmeld.io import AnyPath, MapFileError
 from mapmeld.io.images import open_regular
 
 if TYPE_CHECKING:
     import yaml
+
+Built = TypeVar("Built")
 
 MAX_YAML_BYTES = 1 << 16
 """Largest YAML file that is read; map_server writes about 150 bytes."""
@@ -36,6 +38,9 @@ class Nested:
 
 
 Value = Scalar | list["Scalar | Nested"] | Nested
+
+Tree = Scalar | list["Tree"] | dict[str, "Tree"]
+"""A value with all that is nested in it."""
 
 
 def short(text: str) -> str:
@@ -65,7 +70,26 @@ def read_fields(
         The file cannot be read, is over `MAX_YAML_BYTES`, is not YAML, not a mapping with
         plain words as keys (each once), has anchors, aliases or tags, or is nested too deep.
     """
-    return _Reader(path, what, depth).fields(may_be_empty)
+    return _Reader(path, what, depth, MAX_YAML_BYTES).fields(may_be_empty)
+
+
+def read_tree(path: AnyPath, what: str, *, depth: int, max_bytes: int) -> dict[str, Tree]:
+    """Read the mapping that a YAML file holds with all that is nested in it.
+
+    Parameters
+    ----------
+    path, what, depth
+        As for `read_fields`.
+    max_bytes
+        Largest file that is read.
+
+    Raises
+    ------
+    MapFileError
+        As `read_fields`; every mapping must have plain words as keys, each once, and there must be no
+        second document.
+    """
+    return _Reader(path, what, depth, max_bytes).tree()
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,23 +97,32 @@ class _Reader:
     path: AnyPath
     what: str
     depth: int
+    max_bytes: int
 
     def fail(self, problem: str) -> NoReturn:
         raise MapFileError.of(self.path, problem)
 
     def fields(self, may_be_empty: bool) -> dict[str, Value]:
+        return self._built(self._mapping, may_be_empty)
+
+    def tree(self) -> dict[str, Tree]:
+        return self._built(self._whole_mapping, False)
+
+    def _built(
+        self, build: Callable[[Iterator[yaml.Event]], dict[str, Built] | None], may_be_empty: bool
+    ) -> dict[str, Built]:
         import yaml
 
         with open_regular(self.path, may_be_empty=may_be_empty) as (file, size):
-            if size > MAX_YAML_BYTES:
-                self.fail(f"is too large for {self.what} ({size:,} bytes, {MAX_YAML_BYTES:,} at most)")
-            data = file.read(MAX_YAML_BYTES)
+            if size > self.max_bytes:
+                self.fail(f"is too large for {self.what} ({size:,} bytes, {self.max_bytes:,} at most)")
+            data = file.read(self.max_bytes)
         try:
             text = data.decode("utf-8")
         except UnicodeDecodeError:
             self.fail(f"is not {self.what} (it is not UTF-8 text)")
         try:
-            found = self._mapping(yaml.parse(text, Loader=yaml.SafeLoader))
+            found = build(self._harmless(yaml.parse(text, Loader=yaml.SafeLoader)))
         except yaml.MarkedYAMLError as error:
             where = f" in line {error.problem_mark.line + 1}" if error.problem_mark else ""
             problem = str(error.problem or error.context)
@@ -102,25 +135,70 @@ class _Reader:
             self.fail(f"is not {self.what} (it has no 'key: value' lines)")
         return found or {}
 
+    def _begun(self, events: Iterator[yaml.Event]) -> bool:
+        """Read up to the first field; return whether there is any value at all."""
+        import yaml
+
+        first = next((event for event in events if isinstance(event, yaml.NodeEvent)), None)
+        if first is None or (isinstance(first, yaml.ScalarEvent) and not first.value and not first.style):
+            return False
+        if not isinstance(first, yaml.MappingStartEvent):
+            self.fail(f"is not {self.what} (it has no 'key: value' lines)")
+        return True
+
+    def _whole_mapping(self, events: Iterator[yaml.Event]) -> dict[str, Tree] | None:
+        import yaml
+
+        if not self._begun(events):
+            return None
+        values = self._rest_of_mapping(events)
+        for event in events:
+            if isinstance(event, yaml.NodeEvent):
+                self.fail(f"holds a second document, from line {_line(event)} on; put all into one")
+        return values
+
+    def _rest_of_mapping(self, events: Iterator[yaml.Event]) -> dict[str, Tree]:
+        import yaml
+
+        values: dict[str, Tree] = {}
+        while not isinstance(event := next(events), yaml.MappingEndEvent):
+            key = self._key(event, values)
+            values[key] = self._tree_of(next(events), events)
+        return values
+
+    def _tree_of(self, event: yaml.Event, events: Iterator[yaml.Event]) -> Tree:
+        import yaml
+
+        if isinstance(event, yaml.ScalarEvent):
+            return Scalar(event.value, quoted=event.style is not None)
+        if isinstance(event, yaml.MappingStartEvent):
+            return self._rest_of_mapping(events)
+        items: list[Tree] = []
+        while not isinstance(event := next(events), yaml.SequenceEndEvent):
+            items.append(self._tree_of(event, events))
+        return items
+
+    def _key(self, event: yaml.Event, values: Collection[str]) -> str:
+        import yaml
+
+        if not isinstance(event, yaml.ScalarEvent):
+            self.fail(f"has a key that is no plain word, in line {_line(event)}")
+        if event.value in values:
+            self.fail(f"gives {short(event.value)} twice, in line {_line(event)} again")
+        return str(event.value)
+
     def _mapping(self, events: Iterator[yaml.Event]) -> dict[str, Value] | None:
         """Return the fields; None if the file holds no value at all."""
         import yaml
 
-        events = self._harmless(events)
-        first = next((event for event in events if isinstance(event, yaml.NodeEvent)), None)
-        if first is None or (isinstance(first, yaml.ScalarEvent) and not first.value and not first.style):
+        if not self._begun(events):
             return None
-        if not isinstance(first, yaml.MappingStartEvent):
-            self.fail(f"is not {self.what} (it has no 'key: value' lines)")
         values: dict[str, Value] = {}
         for event in events:
             if isinstance(event, yaml.MappingEndEvent):
                 break  # what follows, such as a second document, is not read, as in nav2
-            if not isinstance(event, yaml.ScalarEvent):
-                self.fail(f"has a key that is no plain word, in line {_line(event)}")
-            if event.value in values:
-                self.fail(f"gives {short(event.value)} twice, in line {_line(event)} again")
-            values[event.value] = self._value(events)
+            key = self._key(event, values)
+            values[key] = self._value(events)
         return values
 
     def _value(self, events: Iterator[yaml.Event]) -> Value:

@@ -5,6 +5,7 @@ the top; only `write_picture` touches a file.
 """
 
 from mapmeld.report.canvas import Canvas, Picture, Window, paint, paint_map, with_turn
+from mapmeld.report.changes import changes
 from mapmeld.report.explain import FIGURE_NAMES, POSSIBLE_NAMES, Explanation, Figure, explain
 from mapmeld.report.overlay import overlay
 from mapmeld.report.png import PictureError, check_picture_path, write_picture
@@ -21,6 +22,7 @@ __all__ = [
     "Picture",
     "PictureError",
     "Window",
+    "changes",
     "check_picture_path",
     "compose",
     "explain",
