@@ -15,6 +15,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from mapmeld.errors import MapmeldError
     from mapmeld.grid import OccupancyGrid
+    from mapmeld.history import Follower, follow
     from mapmeld.io import load, save
     from mapmeld.matching import MatchResult, Verdict, match
     from mapmeld.merging import MergeResult, merge
@@ -22,12 +23,14 @@ if TYPE_CHECKING:
 
 # Resolved on first use, so that importing mapmeld (and `mapmeld --help`) does not import OpenCV.
 _HOMES = {
+    "Follower": "mapmeld.history",
     "MapmeldError": "mapmeld.errors",
     "MatchResult": "mapmeld.matching",
     "MergeResult": "mapmeld.merging",
     "OccupancyGrid": "mapmeld.grid",
     "Pose2": "mapmeld.se2",
     "Verdict": "mapmeld.matching",
+    "follow": "mapmeld.history",
     "load": "mapmeld.io",
     "match": "mapmeld.matching",
     "merge": "mapmeld.merging",
@@ -35,6 +38,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "Follower",
     "MapmeldError",
     "MatchResult",
     "MergeResult",
@@ -42,6 +46,7 @@ __all__ = [
     "Pose2",
     "Verdict",
     "__version__",
+    "follow",
     "load",
     "match",
     "merge",
