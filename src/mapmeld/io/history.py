@@ -22,9 +22,9 @@ from typing import overload
 
 from mapmeld.grid import OccupancyGrid
 from mapmeld.io import AnyPath, MapFileError
+from mapmeld.io.history_writer import TIMES
 from mapmeld.io.map_server import read_map
 
-TIMES_FILE = "times.txt"
 MAP_ENDINGS = (".yaml", ".yml")
 _SECONDS = re.compile(r"\d+(\.\d+)?")
 _LONGEST_TIMES = 10_000_000  # bytes; a day of states a second is 2 MB
@@ -84,7 +84,7 @@ def read_history(folder: AnyPath) -> HistoryFolder:
             for path in place.iterdir()
             if path.suffix.lower() in MAP_ENDINGS and not path.name.startswith(".")
         )
-        has_times = os.path.lexists(place / TIMES_FILE)
+        has_times = os.path.lexists(place / TIMES)
     except OSError as error:
         raise MapFileError.of(place, f"cannot be read: {error.strerror}") from error
     if not maps:
@@ -102,7 +102,7 @@ def _times_in_names(folder: Path, maps: Sequence[Path]) -> list[tuple[float, Pat
             raise MapFileError.of(
                 folder / path.name,
                 "its name is no time; name states by their seconds (12.5.yaml), or list them in a "
-                f"{TIMES_FILE} beside them: 'NAME.yaml SECONDS' on each line",
+                f"{TIMES} beside them: 'NAME.yaml SECONDS' on each line",
             )
         timed.append((float(path.stem), path))
     return timed
@@ -110,7 +110,7 @@ def _times_in_names(folder: Path, maps: Sequence[Path]) -> list[tuple[float, Pat
 
 def _times_listed(folder: Path, maps: Sequence[Path]) -> list[tuple[float, Path]]:
     """Read ``times.txt``."""
-    listing = folder / TIMES_FILE
+    listing = folder / TIMES
     try:
         if listing.stat().st_size > _LONGEST_TIMES:
             raise MapFileError.of(
