@@ -15,6 +15,7 @@ from mapmeld import __version__
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from mapmeld.history import Step
     from mapmeld.io.recordings import RecordingInfo
     from mapmeld.matching import MatchResult
     from mapmeld.merging import MergeResult
@@ -24,12 +25,20 @@ MATCH_SCHEMA = "mapmeld.match/1"
 MERGE_SCHEMA = "mapmeld.merge/1"
 BAG_INFO_SCHEMA = "mapmeld.bag.info/1"
 
+STEP_SCHEMA = "mapmeld.follow.step/1"
+FOLLOW_SCHEMA = "mapmeld.follow/1"
+
 Fields = dict[str, Any]
 
 
 def as_json(content: Fields) -> str:
     """Return a text that every JSON parser takes: ASCII, no NaN."""
     return json.dumps(content, indent=2, allow_nan=False)
+
+
+def as_json_line(content: Fields) -> str:
+    """Return the same on one line, for outputs of many objects (JSON Lines)."""
+    return json.dumps(content, allow_nan=False)
 
 
 def pose_fields(pose: Pose2 | None) -> Fields | None:
@@ -120,6 +129,61 @@ def bag_info_fields(info: RecordingInfo, path: str) -> Fields:
             for topic in info.topics
         ],
         "left_out": info.left_out,
+    }
+
+
+def step_fields(step: Step) -> Fields:
+    """Return the fields of schema mapmeld.follow.step/1."""
+    return {
+        "schema": STEP_SCHEMA,
+        "number": step.number,
+        "process": step.which,
+        "states": list(step.states),
+        "stamp": step.stamp,
+        "standing": str(step.standing),
+        "change": str(step.change),
+        "why": step.why,
+        "work": str(step.work),
+        "best": None if step.best is None else {**_evidence(step.best), "seconds": step.best.seconds},
+    }
+
+
+def follow_fields(
+    last: Step | None,
+    changes: Sequence[Step],
+    names: Sequence[str],
+    method: str,
+    parameters: Any,
+    strategy: str,
+    files: Sequence[Path],
+    seconds: float,
+) -> Fields:
+    """Return the fields of schema mapmeld.follow/1."""
+    best = None if last is None else last.best
+    return {
+        "schema": FOLLOW_SCHEMA,
+        "mapmeld": __version__,
+        "processes": {"1": names[0], "2": names[1]},
+        "method": method,
+        "parameters": asdict(parameters),
+        "strategy": strategy,
+        "states": [0, 0] if last is None else list(last.states),
+        "standing": "undecided" if last is None else str(last.standing),
+        "T_1_2": pose_fields(None if last is None else last.T_1_2),
+        "covariance": None if best is None or best.covariance is None else best.covariance.tolist(),
+        "best": None if best is None else _evidence(best),
+        "changes": [
+            {
+                "number": step.number,
+                "stamp": step.stamp,
+                "change": str(step.change),
+                "why": step.why,
+                "T_1_2": pose_fields(step.T_1_2),
+            }
+            for step in changes
+        ],
+        "files": [str(file) for file in files],
+        "seconds": seconds,
     }
 
 
