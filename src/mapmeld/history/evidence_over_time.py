@@ -3,7 +3,7 @@
 Successive states are no independent evidence: the newest maps show nearly all that the earlier ones
 did. So probabilities are not multiplied up; that of the newest maps counts, and the past decides only
 how much of it is asked for. A match that is accepted is checked at each new state where it lies, which
-needs no search; a search is made while nothing is accepted, on contradiction, and when the maps have grown.
+needs no search; a search is made while nothing is accepted, on contradiction, and when much has changed.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from mapmeld.grid import OccupancyGrid
+from mapmeld.history.changes import changed_area
 from mapmeld.history.step import Change, Finding, Maps, Standing, Work
 from mapmeld.history.transforms import moved, same_place
 from mapmeld.matching import MatchResult, Verdict, match
@@ -38,11 +39,11 @@ class EvidenceParameters:
         comes back after one was withdrawn;
     sure_probability
         or a single one that makes it this probable.
-    search_growth
-        While a match is accepted, other transforms are searched for when the known area of a map has
-        changed by this factor since the last search;
-    undecided_growth
-        while none is, by this one.
+    search_change
+        While a match is accepted, other transforms are searched for when so much of a map has changed
+        since the last search, as a share of its known area then;
+    undecided_change
+        while none is, so much.
     remember_probability
         Other transforms at least this probable are weighed again at the next state.
     """
@@ -50,17 +51,17 @@ class EvidenceParameters:
     keep_probability: float = 0.5
     confirm_states: int = 2
     sure_probability: float = 0.97
-    search_growth: float = 1.25
-    undecided_growth: float = 1.03
+    search_change: float = 0.25
+    undecided_change: float = 0.03
     remember_probability: float = 0.01
 
     def __post_init__(self) -> None:
         for name in ("keep_probability", "sure_probability", "remember_probability"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise ValueError(f"{name} must be above 0 and below 1, not {getattr(self, name)}")
-        for name in ("search_growth", "undecided_growth"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 1.0):
-                raise ValueError(f"{name} must be a factor of at least 1, not {getattr(self, name)}")
+        for name in ("search_change", "undecided_change"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
+                raise ValueError(f"{name} must be a share from 0, not {getattr(self, name)}")
         if not (isinstance(self.confirm_states, int) and self.confirm_states >= 1):
             raise ValueError(f"confirm_states must be a whole number from 1, not {self.confirm_states}")
 
@@ -82,11 +83,17 @@ class EvidenceOverTime:
         self._accepted: Pose2 | None = None  # the last one that was, though it be withdrawn
         self._candidate: Pose2 | None = None  # reaches the threshold, but is not accepted yet,
         self._agreed = 0  # for so many states
-        self._searched: tuple[float, float] | None = None  # known areas at the last search [m^2]
+        self._searched: tuple[float, float] | None = None  # known areas at the last search [m^2],
+        self._changed = (0.0, 0.0)  # and how much of the maps has changed since
 
     def update(self, maps: Maps, previous: Maps | None) -> Finding:
         """Take the newest two maps; `previous` are those of the call before."""
         started = time.perf_counter()
+        if previous is not None:
+            self._changed = (
+                self._changed[0] + _change(previous[0], maps[0]),
+                self._changed[1] + _change(previous[1], maps[1]),
+            )
         newest, work = self._look(maps)
         if self._standing is Standing.ACCEPTED:
             best, change, why = self._uphold(newest, maps, previous)
@@ -108,7 +115,7 @@ class EvidenceOverTime:
     def _look(self, maps: Maps) -> tuple[MatchResult, Work]:
         """Weigh what is known already; search where that does not settle it."""
         known = self._known()
-        if known and not self._grown(maps):
+        if known and not self._much_changed():
             seen = assess(*maps, known, self._judge)
             if self._settled(seen, maps):
                 return seen, Work.CHECK
@@ -124,16 +131,15 @@ class EvidenceOverTime:
     def _worth(self, probability: float | None) -> bool:
         return (probability or 0.0) >= self._evidence.remember_probability
 
-    def _grown(self, maps: Maps) -> bool:
-        """Whether a map has changed by so much since the last search that others may fit now."""
+    def _much_changed(self) -> bool:
+        """Whether so much has changed since the last search that others may fit now."""
         if self._searched is None:
             return True
         accepted = self._standing is Standing.ACCEPTED
-        factor = self._evidence.search_growth if accepted else self._evidence.undecided_growth
-        for now, then in zip((grid.known_area for grid in maps), self._searched, strict=True):
-            if not then / factor < now < then * factor:
-                return True
-        return False
+        share = self._evidence.search_change if accepted else self._evidence.undecided_change
+        return any(
+            changed > share * area for changed, area in zip(self._changed, self._searched, strict=True)
+        )
 
     def _settled(self, seen: MatchResult, maps: Maps) -> bool:
         """Whether a search could not change much: accepted and still sure of it, or nowhere near."""
@@ -143,7 +149,7 @@ class EvidenceOverTime:
 
     def _search(self, maps: Maps) -> MatchResult:
         """Match afresh, and weigh together what that finds and what was known."""
-        self._searched = maps[0].known_area, maps[1].known_area
+        self._searched, self._changed = (maps[0].known_area, maps[1].known_area), (0.0, 0.0)
         fresh = match(*maps, self._method, self._parameters)
         found = [] if fresh.T_a_b is None else [fresh.T_a_b, *(o.T_a_b for o in fresh.alternatives)]
         found = found[:PROPOSALS]
@@ -235,6 +241,10 @@ def _probability_of(T: Pose2 | None, newest: MatchResult, maps: Maps) -> float:
         return newest.probability or 0.0
     others = (other for other in newest.alternatives if same_place(T, other.T_a_b, maps))
     return max((other.probability or 0.0 for other in others), default=0.0)
+
+
+def _change(before: OccupancyGrid, now: OccupancyGrid) -> float:
+    return 0.0 if before is now else changed_area(before, now)
 
 
 def _started_anew(previous: Maps, maps: Maps) -> int | None:

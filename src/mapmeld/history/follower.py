@@ -7,11 +7,10 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Any, Literal, Protocol
 
-import numpy as np
-
 from mapmeld.errors import MapmeldError
 from mapmeld.grid import OccupancyGrid, check_resolutions
 from mapmeld.history.algorithm1 import Algorithm1
+from mapmeld.history.changes import same_map
 from mapmeld.history.evidence_over_time import EvidenceOverTime
 from mapmeld.history.processes import in_time_order
 from mapmeld.history.step import Change, Finding, Maps, Standing, Step, Which, Work
@@ -174,15 +173,3 @@ def follow(
 
 def _states_of(process: Process) -> Iterable[OccupancyGrid]:
     return read_history(process) if isinstance(process, str | os.PathLike) else process
-
-
-def same_map(before: OccupancyGrid, now: OccupancyGrid) -> bool:
-    """Whether two states show the same, cell by cell in the same places; unknown borders aside."""
-    if before.shape == now.shape and before.origin == now.origin:
-        return before.resolution == now.resolution and np.array_equal(before.cells, now.cells)
-    if before.resolution != now.resolution:
-        return False
-    before, now = before.cropped(), now.cropped()
-    near = before.origin.distance_to(now.origin)
-    there = near[0] <= 1e-6 * before.resolution and near[1] <= 1e-9
-    return there and np.array_equal(before.cells, now.cells)
