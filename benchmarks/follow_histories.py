@@ -191,7 +191,7 @@ class Way:
             out.switches += 1
         self._last = answer.T
         if not right:
-            out.wrong.append(f"{moment.name}: {answer.T}, {moment.errors_of(answer.T)}")
+            out.wrong.append(f"{moment.time:g} s, {moment.errors_of(answer.T)}")
         elif out.first_time is None:
             out.first_time, out.first_state, out.first_overlap = moment.time, out.states, moment.overlap
 
@@ -203,7 +203,6 @@ class Moment:
         self.maps = maps
         self.time = stamp
         self.truth = pairing.truth
-        self.name = f"{pairing.name} at {stamp:g} s"
         self.overlap = 0.0 if self.truth is None else overlap_share(*maps, self.truth)
 
     def errors_of(self, T: Pose2) -> str:
@@ -347,9 +346,11 @@ def main() -> None:
         print(f"{number}/{len(chosen)} {pairing.name}", file=sys.stderr, flush=True)
         outcomes += follow_all(pairing, [read_history(folder) for folder in pairing.folders])
     print(report(outcomes))
+    print()
     for outcome in outcomes:
-        for wrong in outcome.wrong:
-            print(f"wrong: {outcome.run}: {wrong}")
+        if outcome.wrong:
+            number, last = len(outcome.wrong), outcome.wrong[-1]
+            print(f"wrong: {outcome.run}: {outcome.name}: {number} states, the last at {last}")
     if asked.rows:
         asked.rows.write_text(json.dumps([asdict(outcome) for outcome in outcomes]), encoding="utf-8")
 
