@@ -26,9 +26,9 @@ from mapmeld.io.atomic import check_targets, write_files
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 NAME = "two_robots.mcap"
-BEGINNING = 1_767_225_600.0  # of the recording [s since the epoch]: 2026 in UTC
+BEGINNING = 1_767_225_600  # of the recording [s since the epoch]: 2026 in UTC
 SCAN_PERIOD = 0.25  # [s]
-DELAY = 0.08  # from the stamp of a map until it is received [s]
+DELAY = 80_000_000  # from the stamp of a map until it is received [ns]
 
 
 class Mapping(NamedTuple):
@@ -52,11 +52,10 @@ def states(seed: int) -> Iterator[tuple[str, float, OccupancyGrid]]:
     yield from sorted(found, key=lambda state: state[1])
 
 
-def grid_message(store: Any, stamp: float, frame_id: str, grid: OccupancyGrid) -> Any:
-    """Return a map as the message that robots publish."""
+def grid_message(store: Any, stamp: int, frame_id: str, grid: OccupancyGrid) -> Any:
+    """Return a map as the message that robots publish; `stamp` in nanoseconds."""
     kinds = store.types
-    seconds = math.floor(stamp)
-    time = kinds["builtin_interfaces/msg/Time"](sec=seconds, nanosec=round((stamp - seconds) * 1e9))
+    time = kinds["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9)
     rows, cols = grid.shape
     half = grid.origin.theta / 2
     pose = kinds["geometry_msgs/msg/Pose"](
@@ -82,9 +81,9 @@ def recording(seed: int) -> bytes:
     schema = writer.register_schema(GRID, "ros2msg", definition.encode())
     channels = {robot: writer.register_channel(f"/{robot}/map", "cdr", schema) for robot in MAPPINGS}
     for robot, after, grid in states(seed):
-        stamp = BEGINNING + after
+        stamp = BEGINNING * 10**9 + round(after * 1e9)
         message = grid_message(store, stamp, f"{robot}/map", grid)
-        received = round((stamp + DELAY) * 1e9)
+        received = stamp + DELAY
         data = bytes(store.serialize_cdr(message, GRID))
         writer.add_message(channels[robot], log_time=received, publish_time=received, data=data)
     writer.finish()

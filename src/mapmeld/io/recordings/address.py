@@ -9,10 +9,7 @@ import os
 import re
 from typing import NamedTuple
 
-from mapmeld.io import MapFileError
-
-SUFFIXES = (".bag", ".mcap", ".db3")
-"""Endings of files that are recordings; rosbag2 folders are known by `METADATA`."""
+from mapmeld.io import FORMATS, MapFileError
 
 METADATA = "metadata.yaml"
 """The file that makes a folder a rosbag2 recording."""
@@ -37,7 +34,7 @@ def split_address(text: str) -> tuple[str, str | None]:
     file, sign, rest = text.rpartition("#")
     if not sign or not file or os.path.lexists(text):
         return text, None
-    if os.path.lexists(file) or file.lower().endswith(SUFFIXES):
+    if os.path.lexists(file) or _has_suffix(file):
         return file, rest
     return text, None
 
@@ -46,7 +43,11 @@ def is_recording(text: str) -> bool:
     """Report whether a text names a recording, or a state in one, by its form and by what is on disk."""
     file, rest = split_address(text)
     folder = os.path.isfile(os.path.join(file, METADATA))  # noqa: PTH113, PTH118  (as above)
-    return rest is not None or file.lower().endswith(SUFFIXES) or folder
+    return rest is not None or _has_suffix(file) or folder
+
+
+def _has_suffix(file: str) -> bool:
+    return file.lower().endswith(FORMATS["recording"].suffixes)
 
 
 def parse_address(text: str) -> Address:

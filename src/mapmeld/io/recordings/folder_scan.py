@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from mapmeld.extras import required
+from mapmeld.io import MapFileError
 from mapmeld.io.images import open_regular
 from mapmeld.io.recordings.mcap_source import mcap_source
 from mapmeld.io.recordings.messages import EXTRA, RecordingError
@@ -49,12 +50,13 @@ def folder_scan(path: str) -> Iterator[Source]:
     with ExitStack() as stack:
         sources: list[Source] = []
         failed: list[RecordingError] = []
-        for file in _unpacked(path, storage_files(path), stack):
-            opened = mcap_source(file, strict=False) if file.endswith(".mcap") else sqlite_scan(file)
+        for file in storage_files(path):
+            plain = _unpacked(file, stack) if file.suffix == PACKED else str(file)
+            opened = mcap_source(plain, strict=False) if plain.endswith(".mcap") else sqlite_scan(plain)
             try:
                 sources.append(stack.enter_context(opened))
-            except RecordingError as error:
-                failed.append(error)
+            except MapFileError as error:
+                failed.append(RecordingError(str(error).replace(plain, str(file))))
         if failed and not sources:
             raise failed[0]
         if not sources:
@@ -64,19 +66,14 @@ def folder_scan(path: str) -> Iterator[Source]:
         yield joined
 
 
-def _unpacked(path: str, files: Collection[Path], stack: ExitStack) -> Iterator[str]:
-    """Give the files; those packed as a whole are unpacked, as far as that goes, until the stack closes."""
-    for file in files:
-        if file.suffix != PACKED:
-            yield str(file)
-            continue
-        folder = stack.enter_context(TemporaryDirectory())
-        plain = Path(folder, file.stem)
-        with open_regular(file) as (packed, _), plain.open("wb") as out:
-            reader = required("zstandard", EXTRA).ZstdDecompressor().stream_reader(packed)
-            with suppress(Exception):  # what is cut off shows when the file is read
-                shutil.copyfileobj(reader, out)
-        yield str(plain)
+def _unpacked(file: Path, stack: ExitStack) -> str:
+    """Unpack a file as far as that goes; return where it is until the stack closes."""
+    plain = Path(stack.enter_context(TemporaryDirectory()), file.stem)
+    with open_regular(file, may_be_empty=True) as (packed, _), plain.open("wb") as out:
+        reader = required("zstandard", EXTRA).ZstdDecompressor().stream_reader(packed)
+        with suppress(Exception):  # what is missing will show when the file is read
+            shutil.copyfileobj(reader, out)
+    return str(plain)
 
 
 def storage_files(path: str) -> list[Path]:

@@ -34,7 +34,11 @@ def mcap_source(path: str, *, strict: bool) -> Iterator[Source]:
     with open_regular(path) as (file, size):
         with damage_said(path):
             source = _indexed(path, file, size) if strict else None
-        yield source or ScannedSource(path, lambda damage: _scan(file, damage), strict=strict)
+        schemas: dict[int, Any] = {}
+        channels: dict[int, Channel] = {}
+        yield source or ScannedSource(
+            path, lambda damage: _scan(file, schemas, channels, damage), strict=strict
+        )
 
 
 # ---------------------------------------------------------------------- by the index
@@ -93,13 +97,14 @@ def _check_summary(file: BinaryIO, size: int) -> None:
 
 
 # ---------------------------------------------------------------------- from front to back
-def _scan(file: BinaryIO, damage: Damage) -> Iterator[Message]:
+def _scan(
+    file: BinaryIO, schemas: dict[int, Any], channels: dict[int, Channel], damage: Damage
+) -> Iterator[Message]:
+    """Give the messages of channels that are known or become so on the way."""
     streams = required("mcap.stream_reader", EXTRA)
     kinds = required("mcap.records", EXTRA)
     file.seek(0)
     records = streams.StreamReader(file, emit_chunks=True, record_size_limit=MAX_PIECE_BYTES).records
-    schemas: dict[int, Any] = {}
-    channels: dict[int, Channel] = {}
     while True:
         try:
             record = next(records)

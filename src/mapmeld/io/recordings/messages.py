@@ -58,7 +58,7 @@ class Patch:
     stamp: float
 
 
-def grid_of(data: bytes, encoding: str, received: float) -> OccupancyGrid | None:
+def grid_of(data: bytes, encoding: str, received: int) -> OccupancyGrid | None:
     """Return the map in an OccupancyGrid message; None for one without cells, which is not yet a map.
 
     The resolution, a 32-bit number in the message, becomes the shortest decimal that stands for it
@@ -71,7 +71,7 @@ def grid_of(data: bytes, encoding: str, received: float) -> OccupancyGrid | None
     data, encoding
         The message as it was recorded, and how it is written.
     received
-        When [s]; the stamp of a map whose header has none.
+        When [ns]; the stamp of a map whose header has none.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def grid_of(data: bytes, encoding: str, received: float) -> OccupancyGrid | None
     )
 
 
-def patch_of(data: bytes, encoding: str, received: float) -> Patch:
+def patch_of(data: bytes, encoding: str, received: int) -> Patch:
     """Return the patch in an OccupancyGridUpdate message; parameters and errors as of `grid_of`."""
     message = _decoded(data, UPDATE, encoding)
     cells = _cells_of(message.data, int(message.height), int(message.width))
@@ -143,9 +143,14 @@ def _yaw_of(turn: Any) -> float:
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-def _stamp_of(header: Any, received: float) -> float:
+def _stamp_of(header: Any, received: int) -> float:
     nanoseconds = int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec)
-    return nanoseconds / 1e9 if nanoseconds else received
+    return seconds(nanoseconds or received)
+
+
+def seconds(nanoseconds: int) -> float:
+    """Return the nearest number of seconds: whole numbers divide without a rounding in between."""
+    return nanoseconds / 10**9
 
 
 # ---------------------------------------------------------------------- decoding

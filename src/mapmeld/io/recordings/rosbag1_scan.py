@@ -28,39 +28,40 @@ Header = Mapping[bytes, bytes]
 @contextmanager
 def rosbag1_scan(path: str) -> Iterator[Source]:
     """Open a rosbag1 file and read what can be read of it."""
-    with open_regular(path) as (file, size):
-        yield ScannedSource(path, lambda damage: _scan(file, size, damage), strict=False)
-
-
-def _scan(file: BinaryIO, size: int, damage: Damage) -> Iterator[Message]:
     connections: dict[bytes, Channel] = {}
+    with open_regular(path) as (file, size):
+        yield ScannedSource(path, lambda damage: _scan(file, size, connections, damage), strict=False)
+
+
+def _scan(file: BinaryIO, size: int, connections: dict[bytes, Channel], damage: Damage) -> Iterator[Message]:
+    """Give the messages of connections that are known or become so on the way."""
     file.seek(len(MAGIC))
     while file.tell() < size:
         try:
-            header, length = _next_header(file, size)
+            header, length = _next_header(file)
             kind = header[b"op"][0]
+            if length > size - file.tell():
+                damage("all from a place on where the file is damaged or cut off: the end of the file")
+                length = size - file.tell()
             if kind not in (_MESSAGE, _CHUNK, _CONNECTION):
                 file.seek(length, 1)
                 continue
-            data = _exactly(file, length)
+            data = file.read(length)
         except Exception as error:  # lengths, fields, anything may be wrong
             damage(f"all from a place on where the file is damaged or cut off: {reason_of(error)}")
             return
         found: list[Message] = []
         try:
-            if kind == _CHUNK:
-                declared = int.from_bytes(header[b"size"], "little")
-                inner = unpacked(data, header[b"compression"].decode(), declared)
-                for inner_header, inner_data in _records(inner):
-                    found += _taken(inner_header, inner_data, connections)
-            else:
-                found += _taken(header, data, connections)
-        except Exception as error:
+            for inner_header, inner_data in _unchunked(header, data) if kind == _CHUNK else [(header, data)]:
+                found += _taken(inner_header, inner_data, connections, damage)
+        except Exception as error:  # what came before it in the chunk is kept
             damage(f"a chunk that is damaged: {reason_of(error)}")
         yield from sorted(found, key=lambda message: message.received)
 
 
-def _taken(header: Header, data: bytes, connections: dict[bytes, Channel]) -> Iterator[Message]:
+def _taken(
+    header: Header, data: bytes, connections: dict[bytes, Channel], damage: Damage
+) -> Iterator[Message]:
     """Take note of a connection; give a message."""
     kind = header[b"op"][0]
     if kind == _CONNECTION:
@@ -68,19 +69,29 @@ def _taken(header: Header, data: bytes, connections: dict[bytes, Channel]) -> It
         connections[header[b"conn"]] = Channel(header[b"topic"].decode(), full_type(name), ROS1)
     elif kind == _MESSAGE:
         seconds, nanoseconds = struct.unpack("<LL", header[b"time"])
-        yield Message(connections[header[b"conn"]], seconds * 10**9 + nanoseconds, data)
+        if header[b"conn"] in connections:
+            yield Message(connections[header[b"conn"]], seconds * 10**9 + nanoseconds, data)
+        else:
+            damage("a message of a connection that is not described")
 
 
-def _next_header(file: BinaryIO, size: int) -> tuple[Header, int]:
+def _next_header(file: BinaryIO) -> tuple[Header, int]:
     """Read the header of the next record and the length of its data, which follows."""
     length = int.from_bytes(_exactly(file, 4), "little")
     if length > _MAX_HEADER_BYTES:
         raise ValueError(f"a header of {length:,} bytes")
     header = _fields(_exactly(file, length))
     length = int.from_bytes(_exactly(file, 4), "little")
-    if length > min(size - file.tell(), MAX_PIECE_BYTES):
-        raise ValueError("a record that is longer than what follows")
+    if length > MAX_PIECE_BYTES:
+        raise ValueError(f"a record of {length:,} bytes")
     return header, length
+
+
+def _unchunked(header: Header, data: bytes) -> Iterator[tuple[Header, bytes]]:
+    compression = header[b"compression"].decode()
+    if compression == "none":  # may be cut off, and is of use all the same
+        return _records(data)
+    return _records(unpacked(data, compression, int.from_bytes(header[b"size"], "little")))
 
 
 def _records(data: bytes) -> Iterator[tuple[Header, bytes]]:

@@ -15,13 +15,14 @@ Damage = Callable[[str], None]
 """Takes note of something that cannot be read, or raises."""
 
 Scan = Callable[[Damage], Iterator[Message]]
-"""Goes through a recording once and gives every message of every channel."""
+"""Goes through a recording once and gives every message of every channel that it knows by then."""
 
 
 class ScannedSource:
     """A recording read from front to back, as a `Source`.
 
-    Opening goes through all of it once, to find channels and the first message.
+    Opening goes through all of it to find channels and the first message; a damaged one once more
+    before that, because what describes a channel may come after messages of it.
 
     Parameters
     ----------
@@ -40,7 +41,10 @@ class ScannedSource:
         self.left_out: Counter[str] = Counter()
         channels: dict[Channel, None] = {}
         self.start: int | None = None
-        for channel, received, _ in scan(self._refuse if strict else lambda reason: None):
+        if not strict:
+            for _ in scan(_ignore):
+                pass
+        for channel, received, _ in scan(self._refuse if strict else _ignore):
             channels[channel] = None
             self.start = received if self.start is None else min(self.start, received)
         self.channels = tuple(channels)
@@ -65,3 +69,7 @@ class ScannedSource:
 
     def _note(self, reason: str) -> None:
         self.left_out[reason] += 1
+
+
+def _ignore(reason: str) -> None:
+    pass

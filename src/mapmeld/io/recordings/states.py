@@ -19,6 +19,7 @@ from mapmeld.io.recordings.messages import (
     grid_of,
     patch_of,
     patched,
+    seconds,
 )
 from mapmeld.io.recordings.opening import Damaged, open_recording
 from mapmeld.io.recordings.source import Channel, Source
@@ -85,12 +86,12 @@ class MapStates(Iterator[OccupancyGrid]):
         for channel, received, data in source.messages(channels):
             try:
                 if channel.type == GRID:
-                    current = grid_of(data, channel.encoding, received / 1e9)
+                    current = grid_of(data, channel.encoding, received)
                     changed = current
                 else:
-                    changed = self._updated(current, data, channel, received / 1e9)
+                    changed = self._updated(current, data, channel, received)
             except BadMessageError as error:
-                after = (received - start) / 1e9
+                after = seconds(received - start)
                 if damaged == "refuse":
                     raise RecordingError.of(
                         path,
@@ -103,10 +104,10 @@ class MapStates(Iterator[OccupancyGrid]):
                 continue
             if changed is not None:
                 current = changed
-                yield State((received - start) / 1e9, changed)
+                yield State(seconds(received - start), changed)
 
     def _updated(
-        self, current: OccupancyGrid | None, data: bytes, channel: Channel, received: float
+        self, current: OccupancyGrid | None, data: bytes, channel: Channel, received: int
     ) -> OccupancyGrid | None:
         patch = patch_of(data, channel.encoding, received)
         if current is None:
@@ -134,7 +135,7 @@ def map_states(path: AnyPath, topic: str | None = None, *, damaged: Damaged = "r
         Where the map is published; may be left out if there is only one with maps.
     damaged
         "refuse": an error where something cannot be read. "use": pass over it, and count it in
-        `MapStates.left_out`. The recording is then read twice, from front to back.
+        `MapStates.left_out`. The recording is then gone through three times.
 
     Returns
     -------

@@ -6,7 +6,15 @@ from dataclasses import dataclass
 
 from mapmeld.grid import OccupancyGrid
 from mapmeld.io import AnyPath
-from mapmeld.io.recordings.messages import ENCODINGS, GRID, UPDATE, BadMessageError, grid_of, patch_of
+from mapmeld.io.recordings.messages import (
+    ENCODINGS,
+    GRID,
+    UPDATE,
+    BadMessageError,
+    grid_of,
+    patch_of,
+    seconds,
+)
 from mapmeld.io.recordings.opening import Damaged, open_recording
 from mapmeld.io.recordings.source import Channel, Message
 from mapmeld.io.recordings.states import OTHER_GRIDS, UPDATES_OF
@@ -97,7 +105,7 @@ def recording_info(path: AnyPath, *, damaged: Damaged = "refuse") -> RecordingIn
             seen[owner[message.channel]].take(message)
         start = source.start
         topics = tuple(_described(channel, seen[channel], start or 0) for channel in sorted(maps))
-        return RecordingInfo(None if start is None else start / 1e9, topics, dict(source.left_out))
+        return RecordingInfo(None if start is None else seconds(start), topics, dict(source.left_out))
 
 
 @dataclass(slots=True)
@@ -127,18 +135,18 @@ def _described(channel: Channel, seen: _Seen, start: int) -> MapTopic:
         problem = f"cannot be read: {channel.type} as {channel.encoding or 'unknown'}"
     elif seen.last_map is not None:
         try:
-            grid = grid_of(seen.last_map.data, channel.encoding, seen.last_map.received / 1e9)
+            grid = grid_of(seen.last_map.data, channel.encoding, seen.last_map.received)
             problem = None if grid else "the last map has no cells"
         except BadMessageError as error:
-            problem = f"the last map is {error}"
+            problem = f"the last message is {error}"
     return MapTopic(
         name=channel.topic,
         type=channel.type,
         encoding=channel.encoding,
         maps=seen.maps,
         updates=seen.updates,
-        first=None if seen.first is None else (seen.first.received - start) / 1e9,
-        last=None if seen.last is None else (seen.last.received - start) / 1e9,
+        first=None if seen.first is None else seconds(seen.first.received - start),
+        last=None if seen.last is None else seconds(seen.last.received - start),
         first_stamp=_stamp_of(seen.first),
         last_stamp=_stamp_of(seen.last),
         frame_id=grid.frame_id if grid else None,
@@ -153,7 +161,7 @@ def _stamp_of(message: Message | None) -> float | None:
         return None
     read = patch_of if message.channel.type == UPDATE else grid_of
     try:
-        found = read(message.data, message.channel.encoding, message.received / 1e9)
+        found = read(message.data, message.channel.encoding, message.received)
     except BadMessageError:
         return None
     return None if found is None else found.stamp
