@@ -11,7 +11,7 @@ from mapmeld.io import Mode
 from mapmeld.matching import DEFAULT_METHOD as THE_DEFAULT_METHOD
 from mapmeld.merging import FUSIONS
 
-COMMANDS = ("match", "merge", "show", "explain", "demo", "benchmark", "bag")
+COMMANDS = ("match", "merge", "follow", "show", "explain", "demo", "benchmark", "bag")
 
 
 def test_help_names_every_command_and_the_exit_codes() -> None:
@@ -22,7 +22,7 @@ def test_help_names_every_command_and_the_exit_codes() -> None:
     assert all(f"{code} " in outcome.out for code in (0, 1, 2, 70, 130, 141))
 
 
-@pytest.mark.parametrize("command", ["match", "merge", "show"])
+@pytest.mark.parametrize("command", ["match", "merge", "follow", "show"])
 def test_help_names_the_default_method_and_the_way_to_its_settings(command: str) -> None:
     words = " ".join(run(command, "--help").out.replace("│", " ").split())
     assert f"[default: {DEFAULT_METHOD}]" in words

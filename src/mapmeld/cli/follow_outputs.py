@@ -111,6 +111,8 @@ class Outputs:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> bool | None:
+        if self._recording is not None:
+            self._recording.close()
         return self._stack.__exit__(kind, error, trace)
 
     def take(self, step: Step) -> None:
@@ -147,6 +149,7 @@ class Outputs:
             self.files.append(write_gif(frames(self._film), wanted.gif, force=force))
         if wanted.rerun is not None and self._recording is not None:
             self.files.append(self._recording.save(wanted.rerun, force=force))
+            self._recording = None
         written: list[Path] = []
         if self._folder is not None:
             merged = None if last is None else last.merged()

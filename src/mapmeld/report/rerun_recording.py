@@ -111,11 +111,14 @@ class RerunRecording:
             As `check_recording_path`, or the disk refuses.
         """
         check_recording_path(path, force=force)
-        self._stream.flush()
-        content = self._bytes.read(flush=True)
-        self._stream.disconnect()
-        write_files([(path, (content,))], force=force)
+        write_files([(path, (self.close(),))], force=force)
         return Path(path)
+
+    def close(self) -> bytes:
+        """End the recording and return what it holds; one that is just dropped would complain."""
+        content: bytes = self._bytes.read(flush=True) or b""
+        self._stream.disconnect()
+        return content
 
 
 def _merge(map_1: OccupancyGrid, map_2: OccupancyGrid, T_1_2: Pose2) -> Picture:
