@@ -175,7 +175,7 @@ def test_a_recording_of_one_map_asks_for_topics(tmp_path: Path) -> None:
     with (tmp_path / "none.mcap").open("wb") as out:
         writer = mcap.writer.Writer(out)
         writer.start(profile="", library="")
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     done = run("follow", tmp_path / "none.mcap")
     assert done.code == 2
     assert "has no maps; choose two topics: --topics T1 T2" in done.line

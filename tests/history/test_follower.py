@@ -12,7 +12,16 @@ from growing import T_1_2, T_2_PLACE, grown, two_robots
 import mapmeld
 from mapmeld.errors import MapmeldError
 from mapmeld.grid import OccupancyGrid, ResolutionError
-from mapmeld.history import Change, Follower, Standing, Step, UnknownStrategyError, Work, follow
+from mapmeld.history import (
+    Change,
+    EvidenceParameters,
+    Follower,
+    Standing,
+    Step,
+    UnknownStrategyError,
+    Work,
+    follow,
+)
 from mapmeld.history import evidence_over_time as module
 from mapmeld.io.history_writer import write_history
 from mapmeld.matching import METHODS, UnknownMethodError, Verdict
@@ -237,6 +246,18 @@ def test_what_cannot_be_followed_is_said_before_anything_is_read() -> None:
         follow([], [], method="luck")
     with pytest.raises(TypeError, match="AlphabetParameters"):
         follow([], [], parameters=AlphabetParameters())
+    with pytest.raises(ValueError, match="'paper' has no settings"):
+        follow([], [], strategy="paper", evidence=EvidenceParameters())
+
+
+def test_settings_of_the_strategy_count() -> None:
+    place = office()
+    always = EvidenceParameters(search_change=0.0)
+    grown = replace(
+        place, cells=np.where(np.arange(place.cells.size).reshape(place.shape) == 5000, -1, place.cells)
+    )
+    for evidence, work in ((None, Work.CHECK), (always, Work.SEARCH)):
+        assert [step.work for step in follow([place, grown], [place], evidence=evidence)][-1] is work
 
 
 def test_bad_states() -> None:

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 from mapmeld.errors import MapmeldError
 from mapmeld.grid import OccupancyGrid, check_resolutions
 from mapmeld.history.algorithm1 import Algorithm1
 from mapmeld.history.changes import same_map
-from mapmeld.history.evidence_over_time import EvidenceOverTime
+from mapmeld.history.evidence_over_time import EvidenceOverTime, EvidenceParameters
 from mapmeld.history.processes import in_time_order
 from mapmeld.history.step import Change, Finding, Maps, Standing, Step, Which, Work
 from mapmeld.io.history import read_history
 from mapmeld.matching import DEFAULT_METHOD
 from mapmeld.matching.match import checked_parameters
 
-StrategyName = Literal["evidence", "paper"]
-DEFAULT_STRATEGY: StrategyName = "evidence"
+DEFAULT_STRATEGY = "evidence"
 
 Process = Iterable[OccupancyGrid] | str | os.PathLike[str]
 
@@ -32,9 +31,15 @@ class _Strategy(Protocol):
     def update(self, maps: Maps, previous: Maps | None) -> Finding: ...
 
 
-STRATEGIES: dict[str, Callable[[str, Any], _Strategy]] = {
+def _algorithm1(method: str, parameters: Any, evidence: EvidenceParameters | None) -> _Strategy:
+    if evidence is not None:
+        raise ValueError("strategy 'paper' has no settings of evidence over time")
+    return Algorithm1(method, parameters)
+
+
+STRATEGIES: Mapping[str, Callable[[str, Any, EvidenceParameters | None], _Strategy]] = {
     "evidence": EvidenceOverTime,
-    "paper": Algorithm1,
+    "paper": _algorithm1,
 }
 
 
@@ -47,13 +52,15 @@ class Follower:
         As for `mapmeld.match`.
     strategy
         ``evidence`` (`EvidenceOverTime`) or ``paper`` (`Algorithm1`).
+    evidence
+        Settings of strategy ``evidence``; None for the defaults.
 
     Raises
     ------
     UnknownMethodError, UnknownStrategyError
         No such method or strategy.
-    TypeError
-        `parameters` is of another method's class.
+    TypeError, ValueError
+        `parameters` is of another method's class; `evidence` is given with strategy ``paper``.
     """
 
     def __init__(
@@ -61,10 +68,11 @@ class Follower:
         method: str = DEFAULT_METHOD,
         parameters: object | None = None,
         strategy: str = DEFAULT_STRATEGY,
+        evidence: EvidenceParameters | None = None,
     ) -> None:
         if strategy not in STRATEGIES:
             raise UnknownStrategyError(f"unknown strategy {strategy!r}: choose from {', '.join(STRATEGIES)}")
-        self._strategy = STRATEGIES[strategy](method, checked_parameters(method, parameters))
+        self._strategy = STRATEGIES[strategy](method, checked_parameters(method, parameters), evidence)
         self._maps: tuple[OccupancyGrid | None, OccupancyGrid | None] = (None, None)
         self._states = (0, 0)
         self._finding = Finding(None, Standing.UNDECIDED, Change.NONE, "no map yet", Work.NOTHING)
@@ -137,6 +145,7 @@ def follow(
     method: str = DEFAULT_METHOD,
     parameters: object | None = None,
     strategy: str = DEFAULT_STRATEGY,
+    evidence: EvidenceParameters | None = None,
 ) -> Iterator[Step]:
     """Follow two mapping processes: after each new state, give the best match so far and what changed.
 
@@ -151,6 +160,8 @@ def follow(
     strategy
         ``evidence``: evidence over time; a verdict that may be withdrawn. ``paper``: Algorithm 1 of
         "Map Matching for SLAM with Multiple Robots in Different Moments"; the most similar matching stays.
+    evidence
+        Settings of strategy ``evidence``; None for the defaults.
 
     Yields
     ------
@@ -166,7 +177,7 @@ def follow(
     ResolutionError
         While iterating: the maps' cell sizes differ by more than a factor of 100.
     """
-    follower = Follower(method, parameters, strategy)
+    follower = Follower(method, parameters, strategy, evidence)
     states = in_time_order(_states_of(process_1), _states_of(process_2))
     return (follower.update(which, grid) for which, grid in states)
 

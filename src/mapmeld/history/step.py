@@ -30,7 +30,8 @@ class Change(StrEnum):
 
     NONE: nothing. FOUND: accepted, for the first time or again. CONFIRMED: it was accepted and stays.
     LOWERED: it stays, but the newest maps speak less for it. SWITCHED: another transform took its
-    place. WITHDRAWN: it is accepted no more.
+    place. WITHDRAWN: it is accepted no more. (Of strategy ``paper``, which accepts nothing: FOUND is the
+    first matching, CONFIRMED and SWITCHED are said of the best one.)
     """
 
     NONE = "none"
@@ -49,7 +50,7 @@ class Work(StrEnum):
     SEARCH = "search"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Finding:
     """What a strategy makes of the newest two maps; see `Step` for the fields."""
 
@@ -60,7 +61,7 @@ class Finding:
     work: Work
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Step:
     """The answer after one new state.
 
