@@ -9,6 +9,7 @@ from growing import T_1_2, T_2_PLACE, two_robots
 from mapmeld.history import Change, Standing, Work, algorithm1, follow
 from mapmeld.history.algorithm1 import Algorithm1, more_similar
 from mapmeld.matching import METHODS, MatchResult, Verdict
+from mapmeld.matching.alphabet import AlphabetParameters
 from mapmeld.se2 import Pose2
 
 WRONG, RIGHT = Pose2(9, 9, 2), Pose2(1, 0, 0)
@@ -58,6 +59,19 @@ def test_the_verdict_is_that_of_the_states_on_which_it_was_found(played: Algorit
     found = [played.update((grid, grid), None) for _ in range(3)]
     assert [f.standing for f in found] == [Standing.UNDECIDED] * 2 + [Standing.ACCEPTED]
     assert [f.change for f in found] == [Change.NONE, Change.FOUND, Change.CONFIRMED]
+
+
+def test_a_similarity_below_the_threshold_of_the_method_is_accepted_no_more(played: Algorithm1) -> None:
+    grid = office()
+    strict = Algorithm1("alphabet", AlphabetParameters(accept_similarity=0.3))
+    answers[:] = [result(WRONG, 0.9), result(RIGHT, 0.05, Verdict.REJECTED), result(RIGHT, 0.5)]
+    rescored[:] = [0.2, 0.1]
+    found = [strict.update((grid, grid), None) for _ in range(3)]
+    assert [f.standing for f in found] == [Standing.ACCEPTED, Standing.UNDECIDED, Standing.ACCEPTED]
+    assert [f.change for f in found] == [Change.FOUND, Change.WITHDRAWN, Change.SWITCHED]
+    assert found[1].best is not None
+    assert found[1].best.T_a_b == WRONG
+    assert found[1].why.endswith("but not accepted")
 
 
 def test_on_maps_that_grow() -> None:

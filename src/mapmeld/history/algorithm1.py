@@ -22,7 +22,8 @@ class Algorithm1:
     ----------
     best
         Capital lambda, the best current matching, with its similarity, capital psi. Probability and
-        verdict are those of the states on which it was found.
+        verdict are those of the states on which it was found; where the method accepts by a threshold on
+        the similarity (`accept_similarity`), the updated one must reach it too.
     """
 
     def __init__(self, method: str, parameters: Any) -> None:
@@ -33,17 +34,24 @@ class Algorithm1:
     def update(self, maps: Maps, previous: Maps | None) -> Finding:
         """Take delta_1 and delta_2, at least one of them new. No earlier map is needed."""
         del previous
-        Lambda = self._on_new_maps(self.best, maps)
+        before = self.best
+        Lambda = self._on_new_maps(before, maps)
         current = match(*maps, self._method, self._parameters)
         self.best = more_similar(Lambda, current)
-        return _finding(Lambda, self.best, maps)
+        return _finding(before, Lambda, self.best, maps)
 
     def _on_new_maps(self, best: MatchResult | None, maps: Maps) -> MatchResult | None:
         """Re-score the best matching points of the previous iteration (Abstract)."""
         if best is None or best.T_a_b is None:
             return None
         similarity = method_named(self._method).similarity_at(*maps, best.T_a_b, self._parameters)
-        return replace(best, similarity=similarity, overlap=overlap_share(*maps, best.T_a_b))
+        enough = similarity >= getattr(self._parameters, "accept_similarity", 0.0)
+        return replace(
+            best,
+            similarity=similarity,
+            overlap=overlap_share(*maps, best.T_a_b),
+            verdict=best.verdict if enough else Verdict.REJECTED,
+        )
 
 
 def more_similar(previous: MatchResult | None, current: MatchResult) -> MatchResult:
@@ -53,10 +61,14 @@ def more_similar(previous: MatchResult | None, current: MatchResult) -> MatchRes
     return previous
 
 
-def _finding(previous: MatchResult | None, best: MatchResult, maps: Maps) -> Finding:
-    """Say in words what became of the best matching."""
+def _finding(
+    before: MatchResult | None, previous: MatchResult | None, best: MatchResult, maps: Maps
+) -> Finding:
+    """Say in words what became of the best matching: as it was, on the new maps, and now."""
+    accepted = best.verdict is Verdict.ACCEPTED
+    standing = Standing.ACCEPTED if accepted else Standing.UNDECIDED
     if best.T_a_b is None:
-        return Finding(best, Standing.UNDECIDED, Change.NONE, best.reason, Work.SEARCH)
+        return Finding(best, standing, Change.NONE, best.reason, Work.SEARCH)
     similarity = f"similarity {best.similarity:.3f}"
     if previous is None or previous.T_a_b is None:
         change, why = Change.FOUND, f"{similarity}: the first matching"
@@ -70,5 +82,6 @@ def _finding(previous: MatchResult | None, best: MatchResult, maps: Maps) -> Fin
         same = same_place(previous.T_a_b, best.T_a_b, maps)
         change = Change.CONFIRMED if same else Change.SWITCHED
         why = f"{rises}; {moved(previous.T_a_b, best.T_a_b, maps)}"
-    standing = Standing.ACCEPTED if best.verdict is Verdict.ACCEPTED else Standing.UNDECIDED
+    if before is not None and before.verdict is Verdict.ACCEPTED and not accepted:
+        change, why = Change.WITHDRAWN, f"{why}, but not accepted"
     return Finding(best, standing, change, why, Work.SEARCH)
