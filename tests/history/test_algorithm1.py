@@ -54,7 +54,11 @@ def test_an_early_wrong_maximum_is_re_scored_and_then_loses(played: Algorithm1) 
 
 def test_the_verdict_is_that_of_the_states_on_which_it_was_found(played: Algorithm1) -> None:
     grid = office()
-    answers[:] = [result(None, 0.0), result(RIGHT, 0.2, Verdict.REJECTED), result(RIGHT, 0.4)]
+    answers[:] = [
+        result(None, 0.0, Verdict.REJECTED),
+        result(RIGHT, 0.2, Verdict.REJECTED),
+        result(RIGHT, 0.4),
+    ]
     rescored[:] = [0.2, 0.2]
     found = [played.update((grid, grid), None) for _ in range(3)]
     assert [f.standing for f in found] == [Standing.UNDECIDED] * 2 + [Standing.ACCEPTED]
