@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import random
 import shutil
+import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -162,7 +165,7 @@ def test_rosbag1_that_was_not_closed(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["rosbag1-bz2", "mcap-small-chunks"])
 def test_one_bad_chunk_costs_no_other(name: str, tmp_path: Path) -> None:
-    path = FORMATS[name](tmp_path, growing(600, 100))
+    path = FORMATS[name](tmp_path, growing(260, 100))
     whole = list(map_states(path, TOPIC))
     data = bytearray(path.read_bytes())
     middle = len(data) // 2
@@ -249,6 +252,29 @@ def test_of_several_files_the_readable_ones_are_used(tmp_path: Path) -> None:
 
 
 # ---------------------------------------------------------------- made to harm
+@pytest.mark.parametrize("damaged", ["refuse", "use"])
+def test_a_pipe_in_place_of_a_file_is_not_waited_for(tmp_path: Path, damaged: Any) -> None:
+    path = FORMATS["rosbag2-sqlite3"](tmp_path, story())
+    (path / "run.db3").unlink()
+    os.mkfifo(path / "run.db3")
+    for name in (path, path / "run.db3"):
+        with pytest.raises(MapmeldError, match=r"run\.db3: is not a plain file"):
+            map_states(name, TOPIC, damaged=damaged)
+
+
+def test_the_ids_in_a_database_may_be_anything(tmp_path: Path) -> None:
+    path = FORMATS["db3"](tmp_path, story())
+    with closing(sqlite3.connect(path)) as database, database:
+        (last,) = database.execute("SELECT max(id) FROM messages").fetchone()
+        database.execute("UPDATE messages SET id = ? WHERE id = ?", (2**63 - 1, last))
+        database.execute("UPDATE messages SET id = -7 WHERE id = 1")
+        database.execute("INSERT INTO messages VALUES (500, 77, 0, x'00')")
+        database.execute("INSERT INTO messages VALUES (501, 1, 'noon', x'00')")
+    states = map_states(path, TOPIC, damaged="use")
+    assert len(list(states)) == 4
+    assert states.left_out == {"a row that is no message": 2}
+
+
 def _chunks(compression: str, data: bytes, declared: int) -> Iterator[bytes]:
     import io
 

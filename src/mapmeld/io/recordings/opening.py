@@ -14,7 +14,7 @@ from mapmeld.io.recordings import mcap_source, rosbag1_scan, rosbags_source, sql
 from mapmeld.io.recordings.address import METADATA
 from mapmeld.io.recordings.folder_scan import folder_scan, storage_files
 from mapmeld.io.recordings.messages import RecordingError
-from mapmeld.io.recordings.source import Source
+from mapmeld.io.recordings.source import Source, damage_said
 
 Damaged = Literal["refuse", "use"]
 """What to do with a recording that cannot be read whole: refuse it, or use what can be read."""
@@ -39,7 +39,8 @@ def open_recording(path: AnyPath, damaged: Damaged) -> Iterator[Source]:
     strict = damaged == "refuse"
     with ExitStack() as stack:
         if os.path.isdir(name):  # noqa: PTH112  (a text as it was given)
-            _check_folder(name, strict)
+            with damage_said(name):
+                _check_folder(name, strict)
             opened = rosbags_source.rosbag2_source(name) if strict else folder_scan(name)
         else:
             kind = _kind_of(name)
@@ -71,12 +72,15 @@ def _kind_of(name: str) -> str:
 
 
 def _check_folder(name: str, strict: bool) -> None:
+    files = storage_files(name)
+    for file in files:
+        if not file.is_file():  # opening a pipe would wait for somebody to write into it
+            raise RecordingError.of(file, "is not a plain file, so the recording is not read")
     metadata = Path(name, METADATA)
     if metadata.is_file():
         if metadata.stat().st_size > _MAX_METADATA_BYTES:
             raise RecordingError.of(metadata, f"is too large ({metadata.stat().st_size:,} bytes)")
     elif strict:
-        files = storage_files(name)
         hint = f"; name the file in it ({files[0].name}), or see 'mapmeld bag export --help'" if files else ""
         raise RecordingError.of(
             name, f"is a folder without {METADATA}, so not a whole rosbag2 recording{hint}"
