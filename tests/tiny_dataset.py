@@ -75,7 +75,9 @@ Answer = Callable[[OccupancyGrid, OccupancyGrid, Any], MatchResult]
 
 
 def add_method(monkeypatch: pytest.MonkeyPatch, name: str, answer: Answer) -> None:
-    monkeypatch.setitem(cast(dict[str, Method], METHODS), name, Method(answer, NoSettings, "for a test"))
+    monkeypatch.setitem(
+        cast(dict[str, Method], METHODS), name, Method(answer, NoSettings, "for a test", lambda *_: 0.0)
+    )
 
 
 def saying(T_a_b: Pose2 | None, probability: float | None = None) -> Answer:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mapmeld.changes import MapDiff, diff
     from mapmeld.errors import MapmeldError
     from mapmeld.grid import OccupancyGrid
+    from mapmeld.history import Follower, follow
     from mapmeld.io import load, save
     from mapmeld.matching import MatchResult, Verdict, match
     from mapmeld.merging import MergeResult, merge
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 # Resolved on first use, so that importing mapmeld (and `mapmeld --help`) does not import OpenCV.
 _HOMES = {
     "MapDiff": "mapmeld.changes",
+    "Follower": "mapmeld.history",
     "MapmeldError": "mapmeld.errors",
     "MatchResult": "mapmeld.matching",
     "MergeResult": "mapmeld.merging",
@@ -31,6 +33,7 @@ _HOMES = {
     "Pose2": "mapmeld.se2",
     "Verdict": "mapmeld.matching",
     "diff": "mapmeld.changes",
+    "follow": "mapmeld.history",
     "load": "mapmeld.io",
     "match": "mapmeld.matching",
     "merge": "mapmeld.merging",
@@ -38,6 +41,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "Follower",
     "MapDiff",
     "MapmeldError",
     "MatchResult",
@@ -47,6 +51,7 @@ __all__ = [
     "Verdict",
     "__version__",
     "diff",
+    "follow",
     "load",
     "match",
     "merge",

@@ -15,6 +15,7 @@ from mapmeld.merging import FUSIONS
 COMMANDS = (
     "match",
     "merge",
+    "follow",
     "diff",
     "rebase",
     "transform-points",
@@ -34,7 +35,9 @@ def test_help_names_every_command_and_the_exit_codes() -> None:
     assert all(f"{code} " in outcome.out for code in (0, 1, 2, 70, 130, 141))
 
 
-@pytest.mark.parametrize("command", ["match", "merge", "diff", "rebase", "transform-points", "show"])
+@pytest.mark.parametrize(
+    "command", ["match", "merge", "follow", "diff", "rebase", "transform-points", "show"]
+)
 def test_help_names_the_default_method_and_the_way_to_its_settings(command: str) -> None:
     words = " ".join(run(command, "--help").out.replace("│", " ").split())
     assert f"[default: {DEFAULT_METHOD}]" in words

@@ -85,6 +85,13 @@ def test_the_document_lists_what_is_printed(tmp_path: Path, schema: str) -> None
     assert found - {"match.parameters"} == in_short(documented(schema)) - {"match.parameters", *GEOJSON_ONLY}
 
 
+@pytest.mark.parametrize(("schema", "line"), [("mapmeld.follow.step/1", -2), ("mapmeld.follow/1", -1)])
+def test_the_document_lists_what_following_prints(schema: str, line: int) -> None:
+    printed = json.loads(run("follow", RECORDING, "--json").out.splitlines()[line])
+    assert printed["schema"] == schema
+    assert in_short(paths(printed)) == in_short(documented(schema))
+
+
 def test_what_the_default_method_fills_in(tmp_path: Path) -> None:
     printed = json.loads(run("match", *write_maps(tmp_path, "a", "b"), "--json").out)
     assert printed["method"] == "correlative"

@@ -24,7 +24,7 @@ class Invented:
 
 @pytest.fixture
 def _invented(monkeypatch: pytest.MonkeyPatch) -> None:
-    method = Method(lambda *_: None, Invented, "")  # type: ignore[arg-type]
+    method = Method(lambda *_: None, Invented, "", lambda *_: 0.0)  # type: ignore[arg-type]
     # By import_module, for the package's attribute of that name is the function.
     module = import_module("mapmeld.matching.match")
     monkeypatch.setattr(module, "METHODS", {**METHODS, "invented": method})

@@ -22,6 +22,7 @@ from mapmeld.cli.demo import demo
 from mapmeld.cli.diff import diff
 from mapmeld.cli.errors import BAD_INPUT, CLOSED_PIPE, FAULT, INTERRUPTED, NO_MATCH, say
 from mapmeld.cli.explain import explain
+from mapmeld.cli.follow import follow
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.rebase import rebase
@@ -149,6 +150,8 @@ def _options(
     pass
 
 
-for _command in (match, merge, diff, rebase, transform_points, show, explain, demo, benchmark):
+for _command in (
+    match, merge, follow, diff, rebase, transform_points, show, explain, demo, benchmark,
+):  # fmt: skip
     app.command()(_command)
 app.add_typer(bag)

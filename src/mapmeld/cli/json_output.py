@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from mapmeld.changes import MapDiff
     from mapmeld.cli.placement import Placement
     from mapmeld.grid import OccupancyGrid
+    from mapmeld.history import Step
     from mapmeld.io.recordings import RecordingInfo
     from mapmeld.matching import MatchResult
     from mapmeld.merging import MergeResult
@@ -31,12 +32,20 @@ DIFF_SCHEMA = "mapmeld.diff/1"
 REBASE_SCHEMA = "mapmeld.rebase/1"
 TRANSFORM_POINTS_SCHEMA = "mapmeld.transform-points/1"
 
+STEP_SCHEMA = "mapmeld.follow.step/1"
+FOLLOW_SCHEMA = "mapmeld.follow/1"
+
 Fields = dict[str, Any]
 
 
 def as_json(content: Fields) -> str:
     """Return a text that every JSON parser takes: ASCII, no NaN."""
     return json.dumps(content, indent=2, allow_nan=False)
+
+
+def as_json_line(content: Fields) -> str:
+    """Return the same on one line, for outputs of many objects (JSON Lines)."""
+    return json.dumps(content, allow_nan=False)
 
 
 def pose_fields(pose: Pose2 | None) -> Fields | None:
@@ -163,6 +172,61 @@ def diff_fields(
             for region in diff.regions
         ],
         "summary": None if diff is None else diff.summary,
+        "files": [str(file) for file in files],
+        "seconds": seconds,
+    }
+
+
+def step_fields(step: Step) -> Fields:
+    """Return the fields of schema mapmeld.follow.step/1."""
+    return {
+        "schema": STEP_SCHEMA,
+        "number": step.number,
+        "process": step.which,
+        "states": list(step.states),
+        "stamp": step.stamp,
+        "standing": str(step.standing),
+        "change": str(step.change),
+        "why": step.why,
+        "work": str(step.work),
+        "best": None if step.best is None else {**_evidence(step.best), "seconds": step.best.seconds},
+    }
+
+
+def follow_fields(
+    last: Step | None,
+    changes: Sequence[Step],
+    names: Sequence[str],
+    method: str,
+    parameters: Any,
+    strategy: str,
+    files: Sequence[Path],
+    seconds: float,
+) -> Fields:
+    """Return the fields of schema mapmeld.follow/1."""
+    best = None if last is None else last.best
+    return {
+        "schema": FOLLOW_SCHEMA,
+        "mapmeld": __version__,
+        "processes": {"1": names[0], "2": names[1]},
+        "method": method,
+        "parameters": asdict(parameters),
+        "strategy": strategy,
+        "states": [0, 0] if last is None else list(last.states),
+        "standing": "undecided" if last is None else str(last.standing),
+        "T_1_2": pose_fields(None if last is None else last.T_1_2),
+        "covariance": None if best is None or best.covariance is None else best.covariance.tolist(),
+        "best": None if best is None else _evidence(best),
+        "changes": [
+            {
+                "number": step.number,
+                "stamp": step.stamp,
+                "change": str(step.change),
+                "why": step.why,
+                "T_1_2": pose_fields(step.T_1_2),
+            }
+            for step in changes
+        ],
         "files": [str(file) for file in files],
         "seconds": seconds,
     }

@@ -17,6 +17,7 @@ from mapmeld.grid import FREE_UP_TO, OCCUPIED_FROM, OccupancyGrid, at_resolution
 from mapmeld.matching.alphabet.algorithm2 import in_metres
 from mapmeld.matching.alphabet.fitting import black_pixels, jaccard_similarity
 from mapmeld.matching.alphabet.preprocessing import Image, binarise
+from mapmeld.matching.alphabet.rescoring import in_pixels
 from mapmeld.matching.result import MatchResult, Verdict
 from mapmeld.se2 import Pose2
 
@@ -118,3 +119,12 @@ class Evidence:
 def rejected(reason: str) -> MatchResult:
     """Return the answer of a method that found no transform at all."""
     return MatchResult(T_a_b=None, verdict=Verdict.REJECTED, reason=reason)
+
+
+def similarity_at(a: OccupancyGrid, b: OccupancyGrid, T_a_b: Pose2, parameters: object = None) -> float:
+    """Return what the baselines state as similarity, under a transform in metres.
+
+    `parameters` is there because every method's measure is asked alike; this one has no settings.
+    """
+    evidence = Evidence.of(a, b)
+    return float(evidence.similarity(in_pixels(T_a_b, *evidence.maps)))

@@ -1,0 +1,121 @@
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from drawing import cut, office, seen_from
+
+from mapmeld.errors import MapmeldError
+from mapmeld.grid import OccupancyGrid
+from mapmeld.history import Step, follow
+from mapmeld.report import PictureError
+from mapmeld.report.canvas import Picture
+from mapmeld.report.film import FRAMES, STRIP_FRAMES, Film, check_gif_path, frames, strip, write_gif
+from mapmeld.report.palette import BLUE, GREEN, RED
+from mapmeld.se2 import Pose2
+
+T_2_PLACE = Pose2(3.0, -2.0, 0.7)
+
+
+@pytest.fixture(scope="module")
+def steps() -> list[Step]:
+    place = office(0.1)
+    first = [replace(cut(place, 0, 0, x, 12), stamp=x) for x in (4.0, 10.0, 16.0)]
+    second = [replace(seen_from(cut(place, x, 0, 16, 12), T_2_PLACE), stamp=20 - x) for x in (12.0, 0.0)]
+    return list(follow(first, second))
+
+
+def film_of(steps: Sequence[Step]) -> Film:
+    film = Film()
+    for step in steps:
+        film.take(step)
+    return film
+
+
+def has(picture: Picture, colour: tuple[int, int, int]) -> int:
+    return int(np.count_nonzero((picture == colour).all(axis=-1)))
+
+
+def test_a_strip_shows_both_maps_and_from_the_match_on_their_common_walls(steps: list[Step]) -> None:
+    assert steps[-1].T_1_2 is not None
+    assert steps[2].T_1_2 is None
+    undecided, whole = strip(film_of(steps[:3])), strip(film_of(steps))
+    assert whole.shape[1] > undecided.shape[1], "more moments, a longer row"
+    for picture in (undecided, whole):
+        assert has(picture, RED) > 300
+        assert has(picture, BLUE) > 300
+    assert has(whole, GREEN) > 1000 > has(undecided, GREEN), "there the legend alone"
+
+
+def test_every_frame_has_the_same_size(steps: list[Step]) -> None:
+    pictures = frames(film_of(steps))
+    assert len(pictures) == len([step for step in steps if None not in step.maps])
+    assert len({picture.shape for picture in pictures}) == 1
+
+
+def test_of_many_steps_some_are_kept_and_always_the_last(steps: list[Step]) -> None:
+    film = film_of([replace(steps[-1], number=number) for number in range(1, 1002)])
+    kept = [step.number for step in film.steps()]
+    assert kept[-1] == 1001
+    assert FRAMES // 2 <= len(kept) <= FRAMES + 1
+    assert len({b - a for a, b in pairwise(kept[:-1])}) == 1, "evenly spread"
+    assert STRIP_FRAMES <= FRAMES
+
+
+def test_nothing_to_draw(steps: list[Step]) -> None:
+    film = film_of(steps[:1])
+    assert film.steps() == []
+    with pytest.raises(PictureError, match="nothing to draw"):
+        strip(film)
+    with pytest.raises(PictureError, match="nothing to draw"):
+        frames(film)
+
+
+def test_maps_of_different_cells_and_turned_lattices(steps: list[Step]) -> None:
+    place = office(0.1)
+    turned = replace(place, origin=Pose2(5.0, 1.0, 0.3))
+    stepping = list(follow([place], [OccupancyGrid(office(0.05).cells, 0.05, turned.origin)]))
+    assert stepping[-1].T_1_2 is not None
+    assert has(strip(film_of(stepping)), GREEN) > 1000
+
+
+# ---------------------------------------------------------------------- the animation
+gifs = pytest.mark.skipif(not hasattr(cv2, "imencodeanimation"), reason="this OpenCV writes no GIF")
+
+
+@gifs
+def test_an_animation_reads_back(steps: list[Step], tmp_path: Path) -> None:
+    pictures = frames(film_of(steps))
+    path = write_gif(pictures, tmp_path / "film.gif")
+    done, animation = cv2.imreadanimation(str(path))
+    assert done
+    assert len(animation.frames) == len(pictures)
+    drawn = np.asarray(animation.frames[-1])[..., :3].astype(int)
+    assert np.abs(drawn - pictures[-1]).mean() < 3, "colours are not mixed"
+    assert [p.name for p in tmp_path.iterdir()] == ["film.gif"]
+
+
+@gifs
+def test_nothing_is_replaced_unasked(steps: list[Step], tmp_path: Path) -> None:
+    path = tmp_path / "film.gif"
+    path.write_text("mine")
+    pictures = frames(film_of(steps[-1:]))
+    with pytest.raises(MapmeldError, match="exists"):
+        write_gif(pictures, path)
+    write_gif(pictures, path, force=True)
+    assert path.read_bytes().startswith(b"GIF8")
+
+
+def test_only_gif(tmp_path: Path) -> None:
+    with pytest.raises(PictureError, match=re.escape(".gif")):
+        check_gif_path(tmp_path / "film.png")
+
+
+def test_an_opencv_that_writes_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(cv2, "imencodeanimation", raising=False)
+    with pytest.raises(PictureError, match="draw a strip"):
+        check_gif_path(tmp_path / "film.gif")
