@@ -176,6 +176,5 @@ def quick_scores(pa: WallMap, pb: WallMap, t: Doubles, n: int) -> Floats:
 
 def _metres(pa: WallMap, pb: WallMap, n: int) -> Floats:
     """Length of wall [m] that each of the first n points of b, then of a, stands for."""
-    return np.concatenate(
-        [np.full(min(n, len(p.points)), p.metres * max(1.0, len(p.points) / n), np.float32) for p in (pb, pa)]
-    )
+    samples = [(p.metres[:n], p.metres) for p in (pb, pa)]
+    return np.concatenate([some * (every.sum() / some.sum()) for some, every in samples])

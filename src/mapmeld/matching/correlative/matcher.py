@@ -220,7 +220,7 @@ def _answer(
 
 def _similarity(walls_a: WallMap, walls_b: WallMap, found: Evidence) -> float:
     """Jaccard similarity of the walls by their length: explained within `HIT` / of either map."""
-    total = sum(w.metres * len(w.points) for w in (walls_a, walls_b))
+    total = float(walls_a.metres.sum() + walls_b.metres.sum())
     shared = min(found.hit / 2, total / 2)
     return shared / (total - shared)
 

@@ -54,7 +54,7 @@ class WallMap:
     lines
         Unit normals (n,) of the lines that the points lie on, thick walls included; 0 where there is none.
     metres
-        Length of wall that one point stands for [m].
+        Length of wall that each point stands for (n,) [m].
     floor
         Sample of known places (m,) [m].
     area
@@ -70,7 +70,7 @@ class WallMap:
     normals: Plane
     straight: Floats
     lines: Plane
-    metres: float
+    metres: Floats
     floor: Plane
     area: float
 
@@ -126,7 +126,7 @@ def wall_map(masks: MapMasks) -> WallMap:
         normals=wall_points.normal[order].astype(np.complex64),
         straight=wall_points.straight[order].astype(np.float32),
         lines=wall_points.line[order].astype(np.complex64),
-        metres=cell,
+        metres=(wall_points.length[order] * cell).astype(np.float32),
         floor=((floor_col - BORDER + 0.5 + 1j * (floor_row - BORDER + 0.5)) * cell).astype(np.complex64),
         area=cv2.countNonZero(masks.known) * masks.resolution**2,
     )
@@ -134,13 +134,14 @@ def wall_map(masks: MapMasks) -> WallMap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _WallPoints:
-    """One point for each field cell that holds wall; places in field cells."""
+    """One point for each field cell that holds wall; places and lengths in field cells."""
 
     own: Index  # flat field index
     place: NDArray[np.complex128]
     normal: NDArray[np.complex128]
     straight: Doubles
     line: NDArray[np.complex128]
+    length: Doubles  # of wall that the point stands for
 
 
 def _wall_points(row: Index, col: Index, k: int, shape: tuple[int, int]) -> _WallPoints:
@@ -148,7 +149,8 @@ def _wall_points(row: Index, col: Index, k: int, shape: tuple[int, int]) -> _Wal
 
     A point is moved onto the wall's middle line, found from the first and second moments of the wall
     cells in the 3 x 3 field cells around it. This takes the raggedness of a cell out of the walls.
-    A thick wall looks like a blob to them; whether it is a line after all, 5 x 5 tell.
+    A thick wall looks like a blob to them; whether it is a line after all, 5 x 5 tell. Where a wall
+    takes up several field cells side by side, they share its length.
     """
     width = shape[1]
     flat = (row // k + BORDER) * width + (col // k + BORDER)
@@ -164,28 +166,30 @@ def _wall_points(row: Index, col: Index, k: int, shape: tuple[int, int]) -> _Wal
     m = np.stack([np.bincount(i, v, n + 1) for v in (None, x, y, x * x, x * y, y * y)], axis=1).astype(
         np.float64
     )
-    along, straight, middle = _lines(m, place, own, width, reach=1)
+    m = np.column_stack([m, np.arange(n + 1) < n])  # the last column counts field cells
+    along, straight, middle, length = _lines(m, place, own, width, reach=1)
     line = np.where(straight > STRAIGHT_LEAST, along * 1j, 0)
     blob = np.flatnonzero(straight <= STRAIGHT_LEAST)
     if len(blob):
-        along_wide, straight_wide, _ = _lines(m, place, own[blob], width, reach=2)
+        along_wide, straight_wide, _, length[blob] = _lines(m, place, own[blob], width, reach=2)
         line[blob] = np.where(straight_wide > STRAIGHT_LEAST, along_wide * 1j, 0)
     mine = (m[:n, 1] + 1j * m[:n, 2]) / m[:n, 0]
     on_line = middle + along * ((mine - middle) * along.conj()).real
     row_of, col_of = np.divmod(own, width)
     corner = (col_of - BORDER) + 1j * (row_of - BORDER)
     spot = corner + np.where(straight > STRAIGHT_LEAST, on_line, mine)
-    return _WallPoints(own, spot, along * 1j, straight, line)
+    return _WallPoints(own, spot, along * 1j, straight, line, length)
 
 
 def _lines(
     m: Doubles, place: NDArray[np.int32], own: Index, width: int, reach: int
-) -> tuple[NDArray[np.complex128], Doubles, NDArray[np.complex128]]:
+) -> tuple[NDArray[np.complex128], Doubles, NDArray[np.complex128], Doubles]:
     """Fit a line to the wall around each of the field cells `own`, `reach` field cells to every side.
 
-    Returns its direction, how straight the wall is, and its middle, seen from the cell's corner.
+    Returns its direction, how straight the wall is, its middle (from the cell's corner), and the length
+    of it that falls to the cell.
     """
-    s = np.zeros((len(own), 6))
+    s = np.zeros((len(own), 7))
     for dy in range(-reach, reach + 1):
         for dx in range(-reach, reach + 1):
             a = m[place[own + (dy * width + dx)]]
@@ -203,7 +207,10 @@ def _lines(
     half, root = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
     along = np.exp(0.5j * np.arctan2(2 * xy, xx - yy))
     straight = np.where(count >= 3, np.clip(1 - 3 * (half - root) / np.maximum(half + root, 1e-6), 0, 1), 0)
-    return along, straight, mx + 1j * my
+    # A line passes the window on its whole width, and crosses a cell by no more than this factor.
+    slant = np.maximum(np.abs(along.real), np.abs(along.imag))
+    length = np.minimum((2 * reach + 1) / s[:, 6], 1) / slant
+    return along, straight, mx + 1j * my, length
 
 
 def _share(mask: Image, k: int, shape: tuple[int, int]) -> Image:
