@@ -101,11 +101,8 @@ def wall_map(masks: MapMasks) -> WallMap:
         255 - walls, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
     labels = labels.ravel()
-    order = np.random.default_rng(0).permutation(n)
-    place = np.empty(n, np.int32)
-    place[order] = np.arange(n, dtype=np.int32)
     of_label = np.zeros(n + 1, np.int32)
-    of_label[labels[own]] = place
+    of_label[labels[own]] = np.arange(n, dtype=np.int32)
 
     is_free = ((_share(masks.floor, k, shape) > 127) & (walls == 0)).view(np.uint8)
     depth = cv2.distanceTransform(is_free, cv2.DIST_L2, cv2.DIST_MASK_5) * np.float32(cell)
@@ -120,11 +117,11 @@ def wall_map(masks: MapMasks) -> WallMap:
         cell=cell,
         shape=shape,
         depth=depth.ravel(),
-        nearest=of_label[labels],
-        points=(wall_points.place[order] * cell).astype(np.complex64),
-        normals=wall_points.normal[order].astype(np.complex64),
-        straight=wall_points.straight[order].astype(np.float32),
-        lines=wall_points.line[order].astype(np.complex64),
+        nearest=of_label.take(labels),
+        points=(wall_points.place * cell).astype(np.complex64),
+        normals=wall_points.normal.astype(np.complex64),
+        straight=wall_points.straight.astype(np.float32),
+        lines=wall_points.line.astype(np.complex64),
         metres=cell,
         floor=((floor_col - BORDER + 0.5 + 1j * (floor_row - BORDER + 0.5)) * cell).astype(np.complex64),
         area=cv2.countNonZero(masks.known) * masks.resolution**2,
@@ -151,11 +148,14 @@ def _wall_points(wall: Image, k: int, shape: tuple[int, int]) -> _WallPoints:
     """
     width = shape[1]
     # numpy finds what is true in one dimension ten times as fast as what is not 0 in two.
-    row, col = np.divmod(np.flatnonzero(wall.ravel().view(np.bool_)), wall.shape[1])
+    at = np.flatnonzero(wall.ravel().view(np.bool_))
+    row = at // wall.shape[1]
+    col = at - row * wall.shape[1]
     flat = (row // k + BORDER) * width + (col // k + BORDER)
     holds = np.zeros(shape[0] * width, np.bool_)
     holds[flat] = True
-    own = np.flatnonzero(holds)
+    # In any order: the first k of them are a fair sample then.
+    own = np.random.default_rng(0).permutation(np.flatnonzero(holds))
     n = len(own)
     place = np.full(shape[0] * width, n, np.int32)
     place[own] = np.arange(n, dtype=np.int32)
@@ -189,14 +189,16 @@ def _lines(
     for dy in range(-reach, reach + 1):
         for dx in range(-reach, reach + 1):
             s += m.take(place.take(own + (dy * width + dx)), axis=0)
-    count, x, y, xx, xy, yy = s.T.copy()
+    count, x, y, xx, xy, yy = np.ascontiguousarray(s.T)
     # Central moments times the square of count: whole numbers.
     xx, xy, yy = count * xx - x * x, count * xy - x * y, count * yy - y * y
     half, slant = (xx + yy) / 2, (xx - yy) / 2
-    root = np.hypot(slant, xy)
+    root = np.sqrt(slant * slant + xy * xy)
     cosine = np.where(root > 0, slant / np.maximum(root, 0.5), 1)  # of twice the angle
-    along = np.sqrt((1 + cosine) / 2) + 1j * np.copysign(np.sqrt((1 - cosine) / 2), xy)
-    straight = np.where(count >= 3, np.clip(1 - 3 * (half - root) / np.maximum(half + root, 0.5), 0, 1), 0)
+    along = np.empty(len(own), np.complex128)
+    along.real, along.imag = np.sqrt((1 + cosine) / 2), np.copysign(np.sqrt((1 - cosine) / 2), xy)
+    straight = np.maximum(1 - 3 * (half - root) / np.maximum(half + root, 0.5), 0)
+    straight[count < 3] = 0
     return along, straight, (x + 1j * y) / count
 
 
