@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmeld.matching.correlative.masks import Image, MapMasks
+from mapmeld.matching.correlative.masks import Image, MapMasks, block_means
 from mapmeld.se2 import Pose2
 
 Floats = NDArray[np.float32]
@@ -205,9 +205,9 @@ def _lines(
 def _share(mask: Image, k: int, shape: tuple[int, int]) -> Image:
     """Return the share of each k x k block where mask holds, 0..255, with the fields' border."""
     rows, cols = shape[0] - 2 * BORDER, shape[1] - 2 * BORDER
-    if k > 1:
-        mask = cv2.copyMakeBorder(
-            mask, 0, rows * k - mask.shape[0], 0, cols * k - mask.shape[1], cv2.BORDER_CONSTANT, value=0
-        )
-        mask = cv2.resize(mask, (cols, rows), interpolation=cv2.INTER_AREA)
-    return cv2.copyMakeBorder(mask, BORDER, BORDER, BORDER, BORDER, cv2.BORDER_CONSTANT, value=0)
+    mask = cv2.copyMakeBorder(
+        mask, 0, rows * k - mask.shape[0], 0, cols * k - mask.shape[1], cv2.BORDER_CONSTANT, value=0
+    )
+    return cv2.copyMakeBorder(
+        block_means(mask, k), BORDER, BORDER, BORDER, BORDER, cv2.BORDER_CONSTANT, value=0
+    )
