@@ -55,17 +55,3 @@ def map_masks(grid: OccupancyGrid) -> MapMasks | None:
         resolution=grid.resolution,
         origin=Pose2(float(x), float(y), grid.origin.theta),
     )
-
-
-def block_means(image: Image, k: int) -> Image:
-    """Return the average of each k x k block of an image that consists of whole blocks."""
-    while k % 4 == 0:
-        # OpenCV halves an image many times as fast as it shrinks it by any other number.
-        image = _shrunk(image, 2)
-        k //= 2
-    return image if k == 1 else _shrunk(image, k)
-
-
-def _shrunk(image: Image, k: int) -> Image:
-    rows, cols = image.shape
-    return cv2.resize(image, (cols // k, rows // k), interpolation=cv2.INTER_AREA)

@@ -212,7 +212,7 @@ def _correlation(spectrum_a: Image, spectrum_b: Image, half_turn: int) -> Image:
 
 def _extent(points: NDArray[np.float32], theta: float) -> Rows:
     c, s = math.cos(theta), math.sin(theta)
-    reach: Rows = np.abs(points @ np.array([[c, s], [-s, c]], np.float32)).max(axis=0).astype(np.float64)
+    reach: Rows = np.abs(np.array([[c, -s], [s, c]], np.float32) @ points.T).max(axis=1).astype(np.float64)
     return 2 * reach + 1.0
 
 
