@@ -261,11 +261,13 @@ def _distinct(rows: Rows) -> list[Rows]:
     near = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2 < APART_METRES**2
     heading = np.stack([np.cos(turn), np.sin(turn)])
     near &= heading.T @ heading > math.cos(APART_RADIANS)
+    far = ~near
     kept: list[int] = []
     alive = np.ones(len(rows), np.bool_)
-    while len(kept) < LISTED and alive.any():
+    while len(kept) < min(LISTED, len(rows)):
         best = int(alive.argmax())
+        if not alive[best]:
+            break
         kept.append(best)
-        alive &= ~near[best]
-        alive[best] = False
+        alive &= far[best]
     return [rows[k] for k in kept]
