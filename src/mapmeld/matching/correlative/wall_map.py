@@ -78,10 +78,16 @@ class WallMap:
     def at(self, z: Plane) -> Index:
         """Return flat field indices of points of the local frame; outside is the (unknown) border."""
         rows, cols = self.shape
-        scale, border = np.float32(1 / self.cell), np.float32(BORDER)
-        c = np.minimum(np.maximum(z.real * scale + border, 0), cols - 1).astype(np.intp)
-        r = np.minimum(np.maximum(z.imag * scale + border, 0), rows - 1).astype(np.intp)
-        return np.asarray(r * cols + c)
+        scale = np.float32(1 / self.cell)
+        row, col = z.imag * scale, z.real * scale
+        for at, last in ((row, rows - 1), (col, cols - 1)):
+            at += np.float32(BORDER)
+            np.maximum(at, 0, out=at)
+            np.minimum(at, last, out=at)
+        flat = row.astype(np.intp)
+        flat *= cols
+        flat += col.astype(np.intp)
+        return flat
 
 
 def wall_map(masks: MapMasks) -> WallMap:
