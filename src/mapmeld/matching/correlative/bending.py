@@ -29,31 +29,43 @@ def smooth_bending(pa: WallMap, pb: WallMap, t: Doubles, x: Plane) -> Plane:
     _, w = robust_weights(p, 1.0)
     mass = w.sum(axis=1, keepdims=True) + np.float32(1e-6)
     centre = (w * p.x).sum(axis=1, keepdims=True) / mass
-    spread = np.sqrt((w * np.abs(p.x - centre) ** 2).sum(axis=1, keepdims=True) / mass)
-    at_points = _quadratic((p.x - centre) / np.maximum(spread, 1))
+    arm = p.x - centre
+    spread = np.sqrt((w * (arm.real**2 + arm.imag**2)).sum(axis=1, keepdims=True) / mass)
+    per_spread = 1 / np.maximum(spread, 1)
+    at_points = _quadratic(arm * per_spread)
     c = np.zeros((len(t), 12))
-    stiffness = _stiffness()
+    J = np.empty((len(t), 12, p.x.shape[1]), np.float32)
     for scale in _SCALES:
         r, w = robust_weights(p, scale)
-        J = np.concatenate([p.normal.real[:, None] * at_points, p.normal.imag[:, None] * at_points], axis=1)
+        np.multiply(p.normal.real[:, None], at_points, out=J[:, :6])
+        np.multiply(p.normal.imag[:, None], at_points, out=J[:, 6:])
         Jw = J * w[:, None]
-        H = np.matmul(Jw, J.transpose(0, 2, 1)).astype(np.float64) + stiffness
-        g = np.matmul(Jw, r[..., None])[..., 0].astype(np.float64) + c @ stiffness
+        H = np.matmul(Jw, J.transpose(0, 2, 1)).astype(np.float64) + _STIFFNESS
+        g = np.matmul(Jw, r[..., None])[..., 0].astype(np.float64) + c @ _STIFFNESS
         c -= np.linalg.solve(H, g[..., None])[..., 0]
         if scale != _SCALES[-1]:
             p = look_up(pa, pb, t, _POINTS, _displacement(c, at_points))
-    return _displacement(c, _quadratic((x - centre) / np.maximum(spread, 1)))
+    return _displacement(c, _quadratic((x - centre) * per_spread))
 
 
 def _quadratic(z: Plane) -> Floats:
     """Return the six monomials (k, 6, m) of z (k, m)."""
-    x, y = np.clip(z.real, -2, 2), np.clip(z.imag, -2, 2)
-    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1).astype(np.float32)
+    monomials = np.empty((len(z), 6, z.shape[1]), np.float32)
+    one, x, y, xx, xy, yy = monomials.swapaxes(0, 1)
+    one[:] = 1
+    np.maximum(np.minimum(z.real, 2), -2, out=x)
+    np.maximum(np.minimum(z.imag, 2), -2, out=y)
+    np.multiply(x, x, out=xx)
+    np.multiply(x, y, out=xy)
+    np.multiply(y, y, out=yy)
+    return monomials
 
 
 def _displacement(c: Doubles, monomials: Floats) -> Plane:
-    coefficients = (c[:, :6] + 1j * c[:, 6:]).astype(np.complex64)
-    return np.asarray(np.matmul(coefficients[:, None], monomials)[:, 0])
+    u = np.empty((len(c), monomials.shape[2]), np.complex64)
+    xy = np.matmul(c.reshape(-1, 2, 6).astype(np.float32), monomials)
+    u.real, u.imag = xy[:, 0], xy[:, 1]
+    return u
 
 
 def _stiffness() -> Doubles:
@@ -61,6 +73,9 @@ def _stiffness() -> Doubles:
     turn = np.zeros(12)  # a small turn, (-y, x), is no bending
     turn[2], turn[7] = -math.sqrt(0.5), math.sqrt(0.5)
     return np.asarray(stiffness - 0.95 * _SPRING * np.outer(turn, turn))
+
+
+_STIFFNESS = _stiffness()
 
 
 def patches_of(x: Plane) -> tuple[Index, int]:
