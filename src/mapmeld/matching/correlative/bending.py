@@ -15,7 +15,7 @@ from mapmeld.matching.correlative.wall_map import Doubles, Floats, Index, Plane,
 
 PATCH = 4.0  # [m] maps bend over longer ways than this
 PATCH_SPRING = 2.0  # weight, in wall points, of "a patch lies where the smooth bending puts it"
-_SCALES = (0.8, 0.55, 0.35, 0.25)  # [m] tolerance of each step of the bending
+_SCALES = (0.8, 0.6, 0.45, 0.3, 0.25)  # [m] tolerance of each step of the bending
 _SPRING = 4.0  # weight, in wall points, of "maps do not stretch or bend"
 _POINTS = 500
 

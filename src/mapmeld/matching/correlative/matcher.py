@@ -16,23 +16,23 @@ from mapmeld.matching.correlative.covariance import of_inverse, transform_covari
 from mapmeld.matching.correlative.evidence import HIT, Evidence, quick_scores, weigh
 from mapmeld.matching.correlative.parameters import CorrelativeParameters
 from mapmeld.matching.correlative.prepared_map import PreparedMap, prepare
-from mapmeld.matching.correlative.probability import ProbabilityModel, fitted_model
+from mapmeld.matching.correlative.probability import ProbabilityModel, fitted_model, surplus_of_others
 from mapmeld.matching.correlative.search import search
 from mapmeld.matching.correlative.wall_map import Doubles, WallMap
 from mapmeld.matching.result import Alternative, MatchResult, Verdict
 from mapmeld.se2 import wrap_angle
 
 COARSE_SCALES, COARSE_POINTS = (0.8, 0.6, 0.4), 160
-FINE_SCALES, FINE_POINTS = (0.3, 0.2, 0.15, 0.15), 600
-LOOKED_AT = 4  # transforms for which the full evidence is measured
+FINE_SCALES, FINE_POINTS = (0.4, 0.3, 0.2, 0.15, 0.15), 600
+LOOKED_AT = 6  # transforms for which the full evidence is measured
 UNBENT_KEEPS = 0.8  # share of the walls explained as they lie that a transform found by bending must keep
 RIVAL_SCORE = 0.0  # even odds if the mode stood alone
 RIVAL_EXPLAINS = 0.95  # of the share of walls that the best mode explains
 RIVAL_CONTRADICTED = 0.01  # more, as a share of the walls, than in the best mode
 RIVAL_CLEAN = 0.05  # share of the walls contradicted from which the maps themselves tell against it
-FIXED_LEAST = 2.0  # [m] of wall that must fix every direction
+FIXED_LEAST = 4.0  # [m] of wall that must fix every direction
 WALL_LEAST = 40.0  # [m] of wall of both maps in the overlap; the probability was fitted on more
-APART = 0.5  # [m] modes nearer than this (or than the maps bend) are one
+APART = 0.7  # [m] modes nearer than this (or than the maps bend) are one
 APART_TURNED = 0.09  # [rad]
 
 
@@ -47,7 +47,7 @@ class Mode:
     evidence
         What speaks for it.
     score
-        Of the probability model.
+        Of the probability model, as if there were no other modes.
     """
 
     local: Doubles
@@ -126,13 +126,22 @@ def _distinct(walls_b: WallMap, modes: Sequence[Mode]) -> list[Mode]:
     groups: list[list[Mode]] = []
     for mode in modes:
         for group in groups:
-            reach = max(APART, 1.5 * group[0].evidence.bend)
-            if not _differ(walls_b, mode.local, group[0].local, reach, APART_TURNED):
+            if _become_one(walls_b, mode, group[0]):
                 group.append(mode)
                 break
         else:
             groups.append([mode])
     return [max(group, key=lambda mode: mode.evidence.hit) for group in groups]
+
+
+def _become_one(walls_b: WallMap, mode: Mode, other: Mode) -> bool:
+    """Whether two modes are near one another, as they lie or as bending moves them."""
+    reach = max(APART, 1.5 * other.evidence.bend)
+    return any(
+        not _differ(walls_b, s, t, reach, APART_TURNED)
+        for s in (mode.local, mode.evidence.unbent)
+        for t in (other.local, other.evidence.unbent)
+    )
 
 
 def _differ(walls_b: WallMap, s: Doubles, t: Doubles, metres: float, radians: float) -> bool:
@@ -154,10 +163,12 @@ def mode_probabilities(modes: Sequence[Mode], model: ProbabilityModel) -> Double
         min(1.0, mode.evidence.weak / FIXED_LEAST) * min(1.0, mode.evidence.wall / WALL_LEAST)
         for mode in modes
     ]
-    return np.asarray(model.probabilities(_level_rivals(modes)) * np.array(doubt))
+    by_chance = model.chance * surplus_of_others([mode.evidence for mode in modes], LOOKED_AT)
+    scores = np.array([mode.score for mode in modes]) - by_chance
+    return np.asarray(model.probabilities(_level_rivals(modes, scores)) * np.array(doubt))
 
 
-def _level_rivals(modes: Sequence[Mode]) -> list[float]:
+def _level_rivals(modes: Sequence[Mode], scores: Doubles) -> list[float]:
     """Return the modes' scores, those of rivals raised to the best's.
 
     A rival explains what it covers as well as the best does what that covers, next to nothing
@@ -165,18 +176,18 @@ def _level_rivals(modes: Sequence[Mode]) -> list[float]:
     only covers more, which in a place that repeats itself says nothing: the maps would fit equally
     well one room further on.
     """
-    best = modes[0]
-    explained, contradicted = best.evidence.shares
-    scores = []
-    for mode in modes:
+    best = float(scores[0])
+    explained, contradicted = modes[0].evidence.shares
+    levelled = []
+    for mode, score in zip(modes, scores.tolist(), strict=True):
         its_explained, its_contradicted = mode.evidence.shares
         rival = (
             mode.score > RIVAL_SCORE
             and its_explained >= RIVAL_EXPLAINS * explained
             and its_contradicted <= min(contradicted + RIVAL_CONTRADICTED, RIVAL_CLEAN)
         )
-        scores.append(best.score if rival else min(mode.score, best.score))
-    return scores
+        levelled.append(best if rival else min(score, best))
+    return levelled
 
 
 # ---------------------------------------------------------------------- the answer
