@@ -5,10 +5,12 @@ Both maps play the same part: the answer for (b, a) is the inverse of that for (
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mapmeld.grid import OccupancyGrid
 from mapmeld.matching.correlative.alignment import refine, to_local, to_metric, turn_and_shift
@@ -20,7 +22,6 @@ from mapmeld.matching.correlative.probability import ProbabilityModel, fitted_mo
 from mapmeld.matching.correlative.search import search
 from mapmeld.matching.correlative.wall_map import Doubles, WallMap
 from mapmeld.matching.result import Alternative, MatchResult, Verdict
-from mapmeld.se2 import wrap_angle
 
 COARSE_SCALES, COARSE_POINTS = (0.8, 0.6, 0.4), 160
 FINE_SCALES, FINE_POINTS = (0.3, 0.2, 0.15, 0.15), 600
@@ -96,9 +97,10 @@ def _most_promising(walls_a: WallMap, walls_b: WallMap, transforms: Doubles) -> 
     """Return the rows worth a full look, none of them a repetition of a better one."""
     quick = quick_scores(walls_a, walls_b, transforms, 2 * COARSE_POINTS)
     quick[0] = np.inf  # the search's own favourite always gets its full look
+    differ = _differ(walls_b, transforms, 0.4, 0.05)
     kept: list[int] = []
     for k in np.argsort(-quick, kind="stable"):
-        if all(_differ(walls_b, transforms[k], transforms[j], 0.4, 0.05) for j in kept):
+        if differ[k, kept].all():
             kept.append(int(k))
     return kept[:LOOKED_AT]
 
@@ -127,7 +129,7 @@ def _distinct(walls_b: WallMap, modes: Sequence[Mode]) -> list[Mode]:
     for mode in modes:
         for group in groups:
             reach = max(APART, 1.5 * group[0].evidence.bend)
-            if not _differ(walls_b, mode.local, group[0].local, reach, APART_TURNED):
+            if not _differ(walls_b, np.stack([mode.local, group[0].local]), reach, APART_TURNED)[0, 1]:
                 group.append(mode)
                 break
         else:
@@ -135,13 +137,12 @@ def _distinct(walls_b: WallMap, modes: Sequence[Mode]) -> list[Mode]:
     return [max(group, key=lambda mode: mode.evidence.hit) for group in groups]
 
 
-def _differ(walls_b: WallMap, s: Doubles, t: Doubles, metres: float, radians: float) -> bool:
-    """Whether two transforms turn b differently or put its middle at different places."""
-    if abs(wrap_angle(float(s[2] - t[2]))) > radians:
-        return True
-    turn, shift = turn_and_shift(np.stack([s, t]))
+def _differ(walls_b: WallMap, t: Doubles, metres: float, radians: float) -> NDArray[np.bool_]:
+    """Which (k, k) of the transforms t (k, 3) turn b differently or put its middle at different places."""
+    turn, shift = turn_and_shift(t)
     middle = turn[:, 0] * walls_b.points[:200].mean() + shift[:, 0]
-    return bool(abs(middle[0] - middle[1]) > metres)
+    turned = np.abs(np.remainder(t[:, 2] - t[:, 2, None] + math.pi, math.tau) - math.pi)
+    return np.asarray((turned > radians) | (np.abs(middle - middle[:, None]) > metres))
 
 
 def mode_probabilities(modes: Sequence[Mode], model: ProbabilityModel) -> Doubles:
