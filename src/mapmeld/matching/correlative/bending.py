@@ -86,10 +86,10 @@ def patches_of(x: Plane) -> tuple[Index, int]:
     col, row = (np.floor(v * np.float32(1 / PATCH)).astype(np.intp) for v in (x.real, x.imag))
     left, bottom = int(col.min()), int(row.min())
     cols, rows = int(col.max()) - left + 1, int(row.max()) - bottom + 1
-    row *= cols
-    row += col
-    row += np.arange(len(x))[:, None] * (rows * cols) - (bottom * cols + left)
-    return row, len(x) * rows * cols
+    patch: Index = row * cols
+    patch += col
+    patch += np.arange(len(x))[:, None] * (rows * cols) - (bottom * cols + left)
+    return patch, len(x) * rows * cols
 
 
 def patch_shifts(p: WallPairs, patch: Index, count: int) -> Plane:
@@ -99,9 +99,11 @@ def patch_shifts(p: WallPairs, patch: Index, count: int) -> Plane:
     wx, wy = w * nx, w * ny
     of_patch = patch.ravel()
     xx, xy, yy, gx, gy = (
-        np.bincount(of_patch, v.ravel(), count) for v in (wx * nx, wx * ny, wy * ny, wx * r, wy * r)
+        np.bincount(of_patch, v.ravel(), count).astype(np.float64, copy=False)
+        for v in (wx * nx, wx * ny, wy * ny, wx * r, wy * r)
     )
-    xx, yy = xx + PATCH_SPRING, yy + PATCH_SPRING
+    xx += PATCH_SPRING
+    yy += PATCH_SPRING
     det = xx * yy - xy * xy
     return np.asarray((-(yy * gx - xy * gy) / det - 1j * (xx * gy - xy * gx) / det).astype(np.complex64))
 

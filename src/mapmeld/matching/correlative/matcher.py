@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapmeld.grid import OccupancyGrid
 from mapmeld.matching.correlative.alignment import refine, to_local, to_metric, turn_and_shift
@@ -97,7 +96,8 @@ def _most_promising(walls_a: WallMap, walls_b: WallMap, transforms: Doubles) -> 
     """Return the rows worth a full look, none of them a repetition of a better one."""
     quick = quick_scores(walls_a, walls_b, transforms, 2 * COARSE_POINTS)
     quick[0] = np.inf  # the search's own favourite always gets its full look
-    differ = _differ(walls_b, transforms, 0.4, 0.05)
+    metres, radians = _apart(walls_b, transforms)
+    differ = (metres > 0.4) | (radians > 0.05)
     kept: list[int] = []
     for k in np.argsort(-quick, kind="stable"):
         if differ[k, kept].all():
@@ -125,24 +125,25 @@ def _weighed(walls_a: WallMap, walls_b: WallMap, transforms: Doubles, model: Pro
 
 def _distinct(walls_b: WallMap, modes: Sequence[Mode]) -> list[Mode]:
     """Return modes that truly differ, best first; of those that do not, the one that fits best unbent."""
-    groups: list[list[Mode]] = []
-    for mode in modes:
+    metres, radians = _apart(walls_b, np.array([mode.local for mode in modes]))
+    groups: list[list[int]] = []
+    for k in range(len(modes)):
         for group in groups:
-            reach = max(APART, 1.5 * group[0].evidence.bend)
-            if not _differ(walls_b, np.stack([mode.local, group[0].local]), reach, APART_TURNED)[0, 1]:
-                group.append(mode)
+            reach = max(APART, 1.5 * modes[group[0]].evidence.bend)
+            if metres[k, group[0]] <= reach and radians[k, group[0]] <= APART_TURNED:
+                group.append(k)
                 break
         else:
-            groups.append([mode])
-    return [max(group, key=lambda mode: mode.evidence.hit) for group in groups]
+            groups.append([k])
+    return [max((modes[k] for k in group), key=lambda mode: mode.evidence.hit) for group in groups]
 
 
-def _differ(walls_b: WallMap, t: Doubles, metres: float, radians: float) -> NDArray[np.bool_]:
-    """Which (k, k) of the transforms t (k, 3) turn b differently or put its middle at different places."""
+def _apart(walls_b: WallMap, t: Doubles) -> tuple[Doubles, Doubles]:
+    """How far apart (k, k) transforms t (k, 3) put the middle of b [m], and how differently they turn it."""
     turn, shift = turn_and_shift(t)
     middle = turn[:, 0] * walls_b.points[:200].mean() + shift[:, 0]
-    turned = np.abs(np.remainder(t[:, 2] - t[:, 2, None] + math.pi, math.tau) - math.pi)
-    return np.asarray((turned > radians) | (np.abs(middle - middle[:, None]) > metres))
+    turned = np.remainder(t[:, 2] - t[:, 2, None] + math.pi, math.tau) - math.pi
+    return np.abs(middle - middle[:, None]), np.abs(turned)
 
 
 def mode_probabilities(modes: Sequence[Mode], model: ProbabilityModel) -> Doubles:

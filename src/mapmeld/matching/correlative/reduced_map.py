@@ -125,8 +125,8 @@ def shares(mask: Image, k: int) -> Image:
     # place of 255 every half is a whole number.
     whole = 256 - k * k
     rows, cols = mask.shape
-    halved = cv2.copyMakeBorder(mask, 0, -rows % k, 0, -cols % k, cv2.BORDER_CONSTANT)
-    halved &= whole
+    halved: Image = cv2.copyMakeBorder(mask, 0, -rows % k, 0, -cols % k, cv2.BORDER_CONSTANT)
+    np.bitwise_and(halved, whole, out=halved)
     for _ in range(k.bit_length() - 1):
         halved = pooled(halved, 2)
     return cv2.convertScaleAbs(halved, alpha=255 / whole)

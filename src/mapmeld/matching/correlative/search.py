@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -213,13 +214,14 @@ class _Raster:
 
 def _spectrum(image: Image, shape: tuple[int, int]) -> Image:
     """Spectrum of an image cut or filled up with 0 to `shape` (cols, rows) about its middle; all even."""
-    right, top = ((n - m) // 2 for n, m in zip(shape, image.shape[::-1], strict=True))
-    image = image[max(0, -top) : image.shape[0] + min(0, top), max(0, -right) : image.shape[1] + min(0, right)]
+    rows, cols = image.shape
+    right, top = (shape[0] - cols) // 2, (shape[1] - rows) // 2
+    image = image[max(0, -top) : rows + min(0, top), max(0, -right) : cols + min(0, right)]
     right, top = max(0, right), max(0, top)
     return cv2.dft(cv2.copyMakeBorder(image, top, top, right, right, cv2.BORDER_CONSTANT))
 
 
-def _interpolation(at: NDArray[np.float32], n: int) -> NDArray[np.float32]:
+def _interpolation(at: NDArray[Any], n: int) -> NDArray[np.float32]:
     """Matrix (len(at), n) that takes n values, repeated for ever, to those in between at `at`."""
     before = np.floor(at)
     share = at - before
