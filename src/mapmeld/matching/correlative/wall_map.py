@@ -119,7 +119,10 @@ def wall_map(masks: MapMasks) -> WallMap:
     floor = np.flatnonzero(is_known)
     step = max(1, len(floor) // FLOOR_SAMPLE)
     floor = floor[step // 2 :: step]
-    floor_row, floor_col = np.divmod(floor, shape[1])
+    floor_row = floor // shape[1]
+    floor_place = np.empty(len(floor), np.complex64)
+    floor_place.imag = (floor_row + (0.5 - BORDER)) * cell
+    floor_place.real = (floor - floor_row * shape[1] + (0.5 - BORDER)) * cell
     return WallMap(
         frame=masks.origin,
         cell=cell,
@@ -131,7 +134,7 @@ def wall_map(masks: MapMasks) -> WallMap:
         straight=wall_points.straight.astype(np.float32),
         lines=wall_points.line.astype(np.complex64),
         metres=cell,
-        floor=((floor_col - BORDER + 0.5 + 1j * (floor_row - BORDER + 0.5)) * cell).astype(np.complex64),
+        floor=floor_place,
         area=cv2.countNonZero(masks.known) * masks.resolution**2,
     )
 
