@@ -26,8 +26,10 @@ def to_metric(pa: WallMap, pb: WallMap, t: Doubles) -> Pose2:
 
 def turn_and_shift(t: Doubles) -> tuple[Plane, Plane]:
     """Columns (k, 1) with p_a = turn * p_b + shift, of each t (k, 3)."""
-    turn = np.exp(1j * t[:, 2:3]).astype(np.complex64)
-    return turn, (t[:, :1] + 1j * t[:, 1:2]).astype(np.complex64)
+    turn, shift = np.empty((2, len(t), 1), np.complex64)
+    turn.real, turn.imag = np.cos(t[:, 2:]), np.sin(t[:, 2:])
+    shift.real, shift.imag = t[:, :1], t[:, 1:2]
+    return turn, shift
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -83,11 +83,13 @@ def patches_of(x: Plane) -> tuple[Index, int]:
 
     No two rows share a patch.
     """
-    col, row = np.floor(x.real / PATCH).astype(np.intp), np.floor(x.imag / PATCH).astype(np.intp)
-    col -= col.min()
-    row -= row.min()
-    cols, rows = int(col.max()) + 1, int(row.max()) + 1
-    return (np.arange(len(x))[:, None] * rows + row) * cols + col, len(x) * rows * cols
+    col, row = (np.floor(v * np.float32(1 / PATCH)).astype(np.intp) for v in (x.real, x.imag))
+    left, bottom = int(col.min()), int(row.min())
+    cols, rows = int(col.max()) - left + 1, int(row.max()) - bottom + 1
+    patch: Index = row * cols
+    patch += col
+    patch += np.arange(len(x))[:, None] * (rows * cols) - (bottom * cols + left)
+    return patch, len(x) * rows * cols
 
 
 def patch_shifts(p: WallPairs, patch: Index, count: int) -> Plane:
@@ -95,11 +97,13 @@ def patch_shifts(p: WallPairs, patch: Index, count: int) -> Plane:
     r, w = robust_weights(p, 0.4)
     nx, ny = p.normal.real, p.normal.imag
     wx, wy = w * nx, w * ny
+    of_patch = patch.ravel()
     xx, xy, yy, gx, gy = (
-        np.asarray(np.bincount(patch.ravel(), v.ravel(), count), np.float64)
+        np.bincount(of_patch, v.ravel(), count).astype(np.float64, copy=False)
         for v in (wx * nx, wx * ny, wy * ny, wx * r, wy * r)
     )
-    xx, yy = xx + PATCH_SPRING, yy + PATCH_SPRING
+    xx += PATCH_SPRING
+    yy += PATCH_SPRING
     det = xx * yy - xy * xy
     return np.asarray((-(yy * gx - xy * gy) / det - 1j * (xx * gy - xy * gx) / det).astype(np.complex64))
 
@@ -109,6 +113,7 @@ def nearest_rigid(t: Doubles, x: Plane, u: Plane, w: Floats) -> Doubles:
     total = w.sum(axis=1) + 1e-6
     centre, shift = (w * x).sum(axis=1) / total, (w * u).sum(axis=1) / total
     arm = x - centre[:, None].astype(np.complex64)
-    angle = (w * (arm.conj() * u).imag).sum(axis=1) / ((w * np.abs(arm) ** 2).sum(axis=1) + 1e-6)
+    inertia = (w * (arm.real**2 + arm.imag**2)).sum(axis=1) + 1e-6
+    angle = (w * (arm.conj() * u).imag).sum(axis=1) / inertia
     moved = (t[:, 0] + 1j * t[:, 1] - centre) * np.exp(1j * angle) + centre + shift
     return np.stack([moved.real, moved.imag, t[:, 2] + angle], axis=1)

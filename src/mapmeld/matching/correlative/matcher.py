@@ -5,6 +5,7 @@ Both maps play the same part: the answer for (b, a) is the inverse of that for (
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -20,7 +21,6 @@ from mapmeld.matching.correlative.probability import ProbabilityModel, fitted_mo
 from mapmeld.matching.correlative.search import search
 from mapmeld.matching.correlative.wall_map import Doubles, WallMap
 from mapmeld.matching.result import Alternative, MatchResult, Verdict
-from mapmeld.se2 import wrap_angle
 
 COARSE_SCALES, COARSE_POINTS = (0.8, 0.6, 0.4), 160
 FINE_SCALES, FINE_POINTS = (0.4, 0.3, 0.2, 0.15, 0.15), 600
@@ -96,9 +96,11 @@ def _most_promising(walls_a: WallMap, walls_b: WallMap, transforms: Doubles) -> 
     """Return the rows worth a full look, none of them a repetition of a better one."""
     quick = quick_scores(walls_a, walls_b, transforms, 2 * COARSE_POINTS)
     quick[0] = np.inf  # the search's own favourite always gets its full look
+    metres, radians = _apart(walls_b, transforms)
+    differ = (metres > 0.4) | (radians > 0.05)
     kept: list[int] = []
     for k in np.argsort(-quick, kind="stable"):
-        if all(_differ(walls_b, transforms[k], transforms[j], 0.4, 0.05) for j in kept):
+        if differ[k, kept].all():
             kept.append(int(k))
     return kept[:LOOKED_AT]
 
@@ -122,35 +124,32 @@ def _weighed(walls_a: WallMap, walls_b: WallMap, transforms: Doubles, model: Pro
 
 
 def _distinct(walls_b: WallMap, modes: Sequence[Mode]) -> list[Mode]:
-    """Return modes that truly differ, best first; of those that do not, the one that fits best unbent."""
-    groups: list[list[Mode]] = []
-    for mode in modes:
+    """Return modes that truly differ, best first; of those that do not, the one that fits best unbent.
+
+    Modes are one if they are near one another as they lie, or as bending moves them.
+    """
+    count = len(modes)
+    transforms = np.array([mode.local for mode in modes] + [mode.evidence.unbent for mode in modes])
+    metres, radians = _apart(walls_b, transforms)
+    metres[radians > APART_TURNED] = np.inf
+    nearest = metres.reshape(2, count, 2, count).min(axis=(0, 2))
+    groups: list[list[int]] = []
+    for k in range(count):
         for group in groups:
-            if _become_one(walls_b, mode, group[0]):
-                group.append(mode)
+            if nearest[k, group[0]] <= max(APART, 1.5 * modes[group[0]].evidence.bend):
+                group.append(k)
                 break
         else:
-            groups.append([mode])
-    return [max(group, key=lambda mode: mode.evidence.hit) for group in groups]
+            groups.append([k])
+    return [max((modes[k] for k in group), key=lambda mode: mode.evidence.hit) for group in groups]
 
 
-def _become_one(walls_b: WallMap, mode: Mode, other: Mode) -> bool:
-    """Whether two modes are near one another, as they lie or as bending moves them."""
-    reach = max(APART, 1.5 * other.evidence.bend)
-    return any(
-        not _differ(walls_b, s, t, reach, APART_TURNED)
-        for s in (mode.local, mode.evidence.unbent)
-        for t in (other.local, other.evidence.unbent)
-    )
-
-
-def _differ(walls_b: WallMap, s: Doubles, t: Doubles, metres: float, radians: float) -> bool:
-    """Whether two transforms turn b differently or put its middle at different places."""
-    if abs(wrap_angle(float(s[2] - t[2]))) > radians:
-        return True
-    turn, shift = turn_and_shift(np.stack([s, t]))
+def _apart(walls_b: WallMap, t: Doubles) -> tuple[Doubles, Doubles]:
+    """How far apart (k, k) transforms t (k, 3) put the middle of b [m], and how differently they turn it."""
+    turn, shift = turn_and_shift(t)
     middle = turn[:, 0] * walls_b.points[:200].mean() + shift[:, 0]
-    return bool(abs(middle[0] - middle[1]) > metres)
+    turned = np.remainder(t[:, 2] - t[:, 2, None] + math.pi, math.tau) - math.pi
+    return np.abs(middle - middle[:, None]), np.abs(turned)
 
 
 def mode_probabilities(modes: Sequence[Mode], model: ProbabilityModel) -> Doubles:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -72,14 +72,15 @@ def reduce_map(masks: MapMasks) -> ReducedMap:
     # A row for x and one for y: what is done to them is several times as fast then.
     points = (np.stack(places(wall)[::-1]).astype(np.float32) + np.float32(0.5)) * np.float32(cell)
     middle = _middle(points, main)
-    x, y = masks.origin.apply(middle - margin * cell)
+    x, y = middle.tolist()
+    mid = masks.origin @ Pose2(x - margin * cell, y - margin * cell)
     return ReducedMap(
         cell=cell,
         wall=wall,
         floor=floor,
         known=known,
-        middle=(float(middle[0] / cell), float(middle[1] / cell)),
-        T_map_mid=Pose2(float(x), float(y), masks.origin.theta),
+        middle=(x / cell, y / cell),
+        T_map_mid=replace(mid, theta=masks.origin.theta),
         spectrum=spectrum,
         main_direction=main,
         points=(points - middle[:, None]).T,
@@ -125,8 +126,8 @@ def shares(mask: Image, k: int) -> Image:
     # place of 255 every half is a whole number.
     whole = 256 - k * k
     rows, cols = mask.shape
-    halved = cv2.copyMakeBorder(mask, 0, -rows % k, 0, -cols % k, cv2.BORDER_CONSTANT)
-    halved &= whole
+    halved: Image = cv2.copyMakeBorder(mask, 0, -rows % k, 0, -cols % k, cv2.BORDER_CONSTANT)
+    np.bitwise_and(halved, whole, out=halved)
     for _ in range(k.bit_length() - 1):
         halved = pooled(halved, 2)
     return cv2.convertScaleAbs(halved, alpha=255 / whole)

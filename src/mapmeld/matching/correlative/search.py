@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -140,8 +141,9 @@ def _correlate(a: ReducedMap, b: ReducedMap, directions: Sequence[float]) -> Row
                 _interpolation(at / KNOWN_STEP, n)
                 for at, n in zip((columns, lines), coarse_shape, strict=True)
             )
-            spectrum_a = _spectrum(turned_a, shape)
-            known_spectrum_a = _spectrum(turned_known_a, coarse_shape)
+            # The inverse transform's scale is taken along by a, once for all correlations.
+            spectrum_a = _spectrum(turned_a, shape, cv2.DFT_SCALE)
+            known_spectrum_a = _spectrum(turned_known_a, coarse_shape, cv2.DFT_SCALE)
             known_spectrum_b = _spectrum(turned_known_b, coarse_shape)
             spectra_b = [_spectrum(image, shape) for image in fan]
             for half in range(2):
@@ -211,17 +213,16 @@ class _Raster:
         return cv2.warpAffine(self.image, m, shape, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
 
 
-def _spectrum(image: Image, shape: tuple[int, int]) -> Image:
+def _spectrum(image: Image, shape: tuple[int, int], flags: int = 0) -> Image:
     """Spectrum of an image cut or filled up with 0 to `shape` (cols, rows) about its middle; all even."""
-    right, top = ((n - m) // 2 for n, m in zip(shape, image.shape[::-1], strict=True))
-    image = image[
-        max(0, -top) : image.shape[0] + min(0, top), max(0, -right) : image.shape[1] + min(0, right)
-    ]
+    rows, cols = image.shape
+    right, top = (shape[0] - cols) // 2, (shape[1] - rows) // 2
+    image = image[max(0, -top) : rows + min(0, top), max(0, -right) : cols + min(0, right)]
     right, top = max(0, right), max(0, top)
-    return cv2.dft(cv2.copyMakeBorder(image, top, top, right, right, cv2.BORDER_CONSTANT))
+    return cv2.dft(cv2.copyMakeBorder(image, top, top, right, right, cv2.BORDER_CONSTANT), flags=flags)
 
 
-def _interpolation(at: NDArray[np.float32], n: int) -> NDArray[np.float32]:
+def _interpolation(at: NDArray[Any], n: int) -> NDArray[np.float32]:
     """Matrix (len(at), n) that takes n values, repeated for ever, to those in between at `at`."""
     before = np.floor(at)
     share = at - before
@@ -240,7 +241,7 @@ def _correlation(spectrum_a: Image, spectrum_b: Image, half_turn: int) -> Image:
     in the answer.
     """
     product = cv2.mulSpectrums(spectrum_a, spectrum_b, 0, conjB=not half_turn)
-    return cv2.dft(product, flags=cv2.DFT_INVERSE | cv2.DFT_SCALE)
+    return cv2.dft(product, flags=cv2.DFT_INVERSE)
 
 
 def _extent(points: NDArray[np.float32], theta: float) -> Rows:
@@ -259,7 +260,7 @@ def _fft_side(cells: float) -> int:
 def _distinct(rows: Rows) -> list[Rows]:
     """Return the best `LISTED` rows (x, y, theta, score; best first) that are not near a better one."""
     rows = rows[: 5 * LISTED]
-    x, y, turn = rows[:, 0], rows[:, 1], rows[:, 2]
+    (x, y), turn = rows[:, :2].T.astype(np.float32), rows[:, 2]
     near = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2 < APART_METRES**2
     heading = np.stack([np.cos(turn), np.sin(turn)])
     near &= heading.T @ heading > math.cos(APART_RADIANS)

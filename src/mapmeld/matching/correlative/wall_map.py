@@ -101,36 +101,40 @@ def wall_map(masks: MapMasks) -> WallMap:
     wall_points = _wall_points(wall, k, shape)
     own, n = wall_points.own, len(wall_points.own)
 
-    walls = np.zeros(shape[0] * shape[1], np.uint8)
-    walls[own] = 255
-    walls = walls.reshape(shape)
+    no_wall = np.full(shape[0] * shape[1], 255, np.uint8)
+    no_wall[own] = 0
+    no_wall = no_wall.reshape(shape)
     _, labels = cv2.distanceTransformWithLabels(
-        255 - walls, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+        no_wall, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
-    labels = labels.ravel()
+    label = np.asarray(labels, np.int32).ravel()
     of_label = np.zeros(n + 1, np.int32)
-    of_label[labels[own]] = np.arange(n, dtype=np.int32)
+    of_label[label[own]] = np.arange(n, dtype=np.int32)
 
-    is_free = ((_with_border(shares(masks.floor, k)) > 127) & (walls == 0)).view(np.uint8)
-    depth = cv2.distanceTransform(is_free, cv2.DIST_L2, cv2.DIST_MASK_5) * np.float32(cell)
-    is_known = (_with_border(shares(masks.known, k)) > 127) | (walls > 0)
+    is_free = cv2.min(_with_border(cv2.inRange(shares(masks.floor, k), 128, 255)), no_wall)
+    depth: Image = cv2.distanceTransform(is_free, cv2.DIST_L2, cv2.DIST_MASK_5)
+    depth *= np.float32(cell)
+    is_known = (_with_border(shares(masks.known, k)) > 127) | (no_wall == 0)
     depth[~is_known] = -1
     floor = np.flatnonzero(is_known)
     step = max(1, len(floor) // FLOOR_SAMPLE)
     floor = floor[step // 2 :: step]
-    floor_row, floor_col = np.divmod(floor, shape[1])
+    floor_row = floor // shape[1]
+    floor_place = np.empty(len(floor), np.complex64)
+    floor_place.imag = (floor_row + (0.5 - BORDER)) * cell
+    floor_place.real = (floor - floor_row * shape[1] + (0.5 - BORDER)) * cell
     return WallMap(
         frame=masks.origin,
         cell=cell,
         shape=shape,
         depth=depth.ravel(),
-        nearest=of_label.take(labels),
+        nearest=of_label.take(label),
         points=(wall_points.place * cell).astype(np.complex64),
         normals=wall_points.normal.astype(np.complex64),
         straight=wall_points.straight.astype(np.float32),
         lines=wall_points.line.astype(np.complex64),
         metres=(wall_points.length * cell).astype(np.float32),
-        floor=((floor_col - BORDER + 0.5 + 1j * (floor_row - BORDER + 0.5)) * cell).astype(np.complex64),
+        floor=floor_place,
         area=cv2.countNonZero(masks.known) * masks.resolution**2,
     )
 
@@ -182,7 +186,7 @@ def _wall_points(wall: Image, k: int, shape: tuple[int, int]) -> _WallPoints:
     mine = (m[:n, 1] + 1j * m[:n, 2]) / m[:n, 0]
     on_line = middle + along * ((mine - middle) * along.conj()).real
     spot = np.where(straight > STRAIGHT_LEAST, on_line, mine) / (2 * k) - (1 + 1j) * BORDER
-    return _WallPoints(own, spot, along * 1j, straight, line, length)
+    return _WallPoints(own, np.asarray(spot), along * 1j, straight, line, length)
 
 
 def _lines(
