@@ -158,13 +158,18 @@ def mode_probabilities(modes: Sequence[Mode], model: ProbabilityModel) -> Double
     What the model says, less where it cannot know: where next to no wall fixes some direction, so that
     the maps slide along one another, or with less wall than it was fitted on.
     """
-    doubt = [
-        min(1.0, mode.evidence.weak / FIXED_LEAST) * min(1.0, mode.evidence.wall / WALL_LEAST)
-        for mode in modes
-    ]
+    trust = [_fixed(mode.evidence) * _enough(mode.evidence) for mode in modes]
     by_chance = model.chance * surplus_of_others([mode.evidence for mode in modes], LOOKED_AT)
     scores = np.array([mode.score for mode in modes]) - by_chance
-    return np.asarray(model.probabilities(_level_rivals(modes, scores)) * np.array(doubt))
+    return np.asarray(model.probabilities(_level_rivals(modes, scores)) * np.array(trust))
+
+
+def _fixed(found: Evidence) -> float:
+    return min(1.0, found.weak / FIXED_LEAST)
+
+
+def _enough(found: Evidence) -> float:
+    return min(1.0, found.wall / WALL_LEAST)
 
 
 def _level_rivals(modes: Sequence[Mode], scores: Doubles) -> list[float]:
@@ -200,7 +205,7 @@ def _answer(
     )
     if probabilities[0] >= accept:
         verdict = Verdict.ACCEPTED
-    elif best.weak < FIXED_LEAST and modes[0].score > RIVAL_SCORE:
+    elif best.weak < FIXED_LEAST and _enough(best) / (1 + math.exp(-modes[0].score)) > 0.5:
         verdict = Verdict.AMBIGUOUS
         reason += f"; only {best.weak:.1f} m of it fix the place along the others"
     elif probabilities.sum() >= accept:

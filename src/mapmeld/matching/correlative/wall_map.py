@@ -186,7 +186,7 @@ def _wall_points(wall: Image, k: int, shape: tuple[int, int]) -> _WallPoints:
     mine = (m[:n, 1] + 1j * m[:n, 2]) / m[:n, 0]
     on_line = middle + along * ((mine - middle) * along.conj()).real
     spot = np.where(straight > STRAIGHT_LEAST, on_line, mine) / (2 * k) - (1 + 1j) * BORDER
-    return _WallPoints(own, np.asarray(spot), along * 1j, straight, line, length)
+    return _WallPoints(own, np.asarray(spot), along * 1j, straight, line, length / (2 * k))
 
 
 def _lines(
@@ -194,8 +194,8 @@ def _lines(
 ) -> tuple[NDArray[np.complex128], Doubles, NDArray[np.complex128], Doubles]:
     """Fit a line to the wall around each of the field cells `own`, `reach` field cells to every side.
 
-    Returns its direction, how straight the wall is, its middle, and the length of it that falls to the
-    cell.
+    Returns its direction, how straight the wall is, its middle, and the length of it that falls to each
+    of the field cells; in half cells of the map.
     """
     s = np.zeros((len(own), 7))
     for dy in range(-reach, reach + 1):
@@ -211,9 +211,8 @@ def _lines(
     along.real, along.imag = np.sqrt((1 + cosine) / 2), np.copysign(np.sqrt((1 - cosine) / 2), xy)
     straight = np.maximum(1 - 3 * (half - root) / np.maximum(half + root, 0.5), 0)
     straight[count < 3] = 0
-    # A line passes the window on its whole width, and crosses a cell by no more than this factor.
-    aslant = 1 / np.maximum(np.abs(along.real), np.abs(along.imag))
-    length = aslant * np.minimum((2 * reach + 1) / cells, 1)
+    # What is spread evenly over a length has a twelfth of its square as variance; so has each map cell.
+    length = np.sqrt(12 * ((half + root) / (count * count) + 1 / 3)) / cells
     return along, straight, (x + 1j * y) / count, length
 
 
