@@ -37,8 +37,10 @@ class Pose2:
 
     def __matmul__(self, other: Pose2) -> Pose2:
         """Compose: ``(T_a_b @ T_b_c).apply(p) == T_a_b.apply(T_b_c.apply(p))``."""
-        x, y = self.apply((other.x, other.y))
-        return Pose2(float(x), float(y), wrap_angle(self.theta + other.theta))
+        # As `apply`, without an array: poses are composed by the dozen.
+        c, s = math.cos(self.theta), math.sin(self.theta)
+        x, y = c * other.x - s * other.y + self.x, s * other.x + c * other.y + self.y
+        return Pose2(x, y, wrap_angle(self.theta + other.theta))
 
     def inverse(self) -> Pose2:
         """Return ``T_b_a`` for ``T_a_b``."""

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from mapmeld.matching import correlative
 from mapmeld.matching.correlative.evidence import Evidence
-from mapmeld.matching.correlative.probability import ProbabilityModel, fitted_model
+from mapmeld.matching.correlative.matcher import Mode, mode_probabilities
+from mapmeld.matching.correlative.probability import ProbabilityModel, fitted_model, surplus_of_others
 
 NOTHING = ProbabilityModel(0.0, {})
 scores = st.lists(st.floats(-800, 800), min_size=1, max_size=6)
@@ -69,9 +70,32 @@ def test_what_is_shipped_trusts_plenty_of_wall_and_not_a_little() -> None:
             wall, explained * wall, explained * wall, against * wall, against * wall,
             0.1, 0.6, 0.02, wall / 2, 0.7, wall / 4, np.zeros(3),
         )  # fmt: skip
-        return float(fitted_model().probabilities([fitted_model().score(e)])[0])
+        model = fitted_model()
+        return float(mode_probabilities([Mode(np.zeros(3), e, model.score(e))], model)[0])
 
     assert p(200, 0.98, 0) > 0.95
     assert p(5, 1.0, 0) < 0.5
     assert p(200, 0.5, 0.2) < 0.05
     assert p(200, 0.9, 0.02) < p(200, 0.95, 0.01) < p(400, 0.95, 0.01)
+
+
+def test_what_others_reach_is_taken_off() -> None:
+    def e(share: float) -> Evidence:
+        return Evidence(
+            100, 100 * share, 100 * share, 0, 0, 0.1, 0.6, 0.02, 50, 0.7, 25, np.zeros(3)
+        )  # fmt: skip
+
+    modes = [e(0.9), e(0.5), e(0.3)]
+    own = [mode.surplus for mode in modes]
+    expected = [(own[1] + own[2]) / 5, (own[0] + own[2]) / 5, (own[0] + own[1]) / 5]
+    assert surplus_of_others(modes, 6) == pytest.approx(expected)
+    assert surplus_of_others(modes[:1], 6) == pytest.approx([0])
+    # The same best mode is worth less where the others come near to it.
+    model = fitted_model()
+    assert model.chance > 0
+
+    def p(*shares: float) -> float:
+        found = [Mode(np.zeros(3), e(share), model.score(e(share))) for share in shares]
+        return float(mode_probabilities(found, model)[0])
+
+    assert p(0.9) > p(0.9, 0.5) > p(0.9, 0.7)

@@ -15,7 +15,7 @@ from mapmeld.matching.correlative.wall_map import Doubles, Floats, Index, Plane,
 
 PATCH = 4.0  # [m] maps bend over longer ways than this
 PATCH_SPRING = 2.0  # weight, in wall points, of "a patch lies where the smooth bending puts it"
-_SCALES = (0.8, 0.55, 0.35, 0.25)  # [m] tolerance of each step of the bending
+_SCALES = (0.8, 0.6, 0.45, 0.3, 0.25)  # [m] tolerance of each step of the bending
 _SPRING = 4.0  # weight, in wall points, of "maps do not stretch or bend"
 _POINTS = 500
 
@@ -29,31 +29,43 @@ def smooth_bending(pa: WallMap, pb: WallMap, t: Doubles, x: Plane) -> Plane:
     _, w = robust_weights(p, 1.0)
     mass = w.sum(axis=1, keepdims=True) + np.float32(1e-6)
     centre = (w * p.x).sum(axis=1, keepdims=True) / mass
-    spread = np.sqrt((w * np.abs(p.x - centre) ** 2).sum(axis=1, keepdims=True) / mass)
-    at_points = _quadratic((p.x - centre) / np.maximum(spread, 1))
+    arm = p.x - centre
+    spread = np.sqrt((w * (arm.real**2 + arm.imag**2)).sum(axis=1, keepdims=True) / mass)
+    per_spread = 1 / np.maximum(spread, 1)
+    at_points = _quadratic(arm * per_spread)
     c = np.zeros((len(t), 12))
-    stiffness = _stiffness()
+    J = np.empty((len(t), 12, p.x.shape[1]), np.float32)
     for scale in _SCALES:
         r, w = robust_weights(p, scale)
-        J = np.concatenate([p.normal.real[:, None] * at_points, p.normal.imag[:, None] * at_points], axis=1)
+        np.multiply(p.normal.real[:, None], at_points, out=J[:, :6])
+        np.multiply(p.normal.imag[:, None], at_points, out=J[:, 6:])
         Jw = J * w[:, None]
-        H = np.matmul(Jw, J.transpose(0, 2, 1)).astype(np.float64) + stiffness
-        g = np.matmul(Jw, r[..., None])[..., 0].astype(np.float64) + c @ stiffness
+        H = np.matmul(Jw, J.transpose(0, 2, 1)).astype(np.float64) + _STIFFNESS
+        g = np.matmul(Jw, r[..., None])[..., 0].astype(np.float64) + c @ _STIFFNESS
         c -= np.linalg.solve(H, g[..., None])[..., 0]
         if scale != _SCALES[-1]:
             p = look_up(pa, pb, t, _POINTS, _displacement(c, at_points))
-    return _displacement(c, _quadratic((x - centre) / np.maximum(spread, 1)))
+    return _displacement(c, _quadratic((x - centre) * per_spread))
 
 
 def _quadratic(z: Plane) -> Floats:
     """Return the six monomials (k, 6, m) of z (k, m)."""
-    x, y = np.clip(z.real, -2, 2), np.clip(z.imag, -2, 2)
-    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1).astype(np.float32)
+    monomials = np.empty((len(z), 6, z.shape[1]), np.float32)
+    one, x, y, xx, xy, yy = monomials.swapaxes(0, 1)
+    one[:] = 1
+    np.maximum(np.minimum(z.real, 2), -2, out=x)
+    np.maximum(np.minimum(z.imag, 2), -2, out=y)
+    np.multiply(x, x, out=xx)
+    np.multiply(x, y, out=xy)
+    np.multiply(y, y, out=yy)
+    return monomials
 
 
 def _displacement(c: Doubles, monomials: Floats) -> Plane:
-    coefficients = (c[:, :6] + 1j * c[:, 6:]).astype(np.complex64)
-    return np.asarray(np.matmul(coefficients[:, None], monomials)[:, 0])
+    u = np.empty((len(c), monomials.shape[2]), np.complex64)
+    xy = np.matmul(c.reshape(-1, 2, 6).astype(np.float32), monomials)
+    u.real, u.imag = xy[:, 0], xy[:, 1]
+    return u
 
 
 def _stiffness() -> Doubles:
@@ -63,16 +75,21 @@ def _stiffness() -> Doubles:
     return np.asarray(stiffness - 0.95 * _SPRING * np.outer(turn, turn))
 
 
+_STIFFNESS = _stiffness()
+
+
 def patches_of(x: Plane) -> tuple[Index, int]:
     """Return the number of the square patch in which each point x (k, m) lies, and how many there are.
 
     No two rows share a patch.
     """
-    col, row = np.floor(x.real / PATCH).astype(np.intp), np.floor(x.imag / PATCH).astype(np.intp)
-    col -= col.min()
-    row -= row.min()
-    cols, rows = int(col.max()) + 1, int(row.max()) + 1
-    return (np.arange(len(x))[:, None] * rows + row) * cols + col, len(x) * rows * cols
+    col, row = (np.floor(v * np.float32(1 / PATCH)).astype(np.intp) for v in (x.real, x.imag))
+    left, bottom = int(col.min()), int(row.min())
+    cols, rows = int(col.max()) - left + 1, int(row.max()) - bottom + 1
+    patch: Index = row * cols
+    patch += col
+    patch += np.arange(len(x))[:, None] * (rows * cols) - (bottom * cols + left)
+    return patch, len(x) * rows * cols
 
 
 def patch_shifts(p: WallPairs, patch: Index, count: int) -> Plane:
@@ -80,11 +97,13 @@ def patch_shifts(p: WallPairs, patch: Index, count: int) -> Plane:
     r, w = robust_weights(p, 0.4)
     nx, ny = p.normal.real, p.normal.imag
     wx, wy = w * nx, w * ny
+    of_patch = patch.ravel()
     xx, xy, yy, gx, gy = (
-        np.asarray(np.bincount(patch.ravel(), v.ravel(), count), np.float64)
+        np.bincount(of_patch, v.ravel(), count).astype(np.float64, copy=False)
         for v in (wx * nx, wx * ny, wy * ny, wx * r, wy * r)
     )
-    xx, yy = xx + PATCH_SPRING, yy + PATCH_SPRING
+    xx += PATCH_SPRING
+    yy += PATCH_SPRING
     det = xx * yy - xy * xy
     return np.asarray((-(yy * gx - xy * gy) / det - 1j * (xx * gy - xy * gx) / det).astype(np.complex64))
 
@@ -94,6 +113,7 @@ def nearest_rigid(t: Doubles, x: Plane, u: Plane, w: Floats) -> Doubles:
     total = w.sum(axis=1) + 1e-6
     centre, shift = (w * x).sum(axis=1) / total, (w * u).sum(axis=1) / total
     arm = x - centre[:, None].astype(np.complex64)
-    angle = (w * (arm.conj() * u).imag).sum(axis=1) / ((w * np.abs(arm) ** 2).sum(axis=1) + 1e-6)
+    inertia = (w * (arm.real**2 + arm.imag**2)).sum(axis=1) + 1e-6
+    angle = (w * (arm.conj() * u).imag).sum(axis=1) / inertia
     moved = (t[:, 0] + 1j * t[:, 1] - centre) * np.exp(1j * angle) + centre + shift
     return np.stack([moved.real, moved.imag, t[:, 2] + angle], axis=1)

@@ -20,7 +20,9 @@ BINS = 360
 SPECTRUM_BLUR = 0.3
 """[m] Hides the stair steps of walls that cross the lattice."""
 
-_SMOOTHING = math.radians(3.0)
+# What repeats at every right angle is in the even frequencies: these, smoothed, without the mean.
+_SMOOTHED = np.exp(-2 * (np.arange(0, BINS // 2 + 1, 2) * math.radians(3.0)) ** 2)
+_SMOOTHED[0] = 0
 
 Spectrum = NDArray[np.float64]
 
@@ -37,9 +39,8 @@ def direction_spectrum(wall: NDArray[Any], cell: float) -> Spectrum:
 
 def relative_directions(a: Spectrum, b: Spectrum) -> list[tuple[float, float]]:
     """Rotations [rad, modulo a right angle] that lay b's wall directions on a's, best first, with weight."""
-    c = np.fft.irfft(_smooth(a) * np.conj(_smooth(b)), BINS)
     half = BINS // 2
-    c = c[:half] + c[half:]
+    c = np.fft.irfft(_smooth(a) * np.conj(_smooth(b)), half)
     peaks = np.flatnonzero((c >= np.roll(c, 1)) & (c > np.roll(c, -1)))
     peaks = peaks[np.argsort(-c[peaks], kind="stable")]
     out = []
@@ -53,13 +54,9 @@ def relative_directions(a: Spectrum, b: Spectrum) -> list[tuple[float, float]]:
 
 def main_direction(spectrum: Spectrum) -> float:
     """Return the direction [rad, modulo a right angle] in which most wall runs or is crossed."""
-    c = np.fft.irfft(_smooth(spectrum), BINS)
-    return float(np.argmax(c[: BINS // 2] + c[BINS // 2 :])) * math.pi / BINS
+    return float(np.argmax(np.fft.irfft(_smooth(spectrum), BINS // 2))) * math.pi / BINS
 
 
 def _smooth(spectrum: Spectrum) -> NDArray[np.complex128]:
-    """Fourier coefficients of the spectrum, smoothed, without mean, of unit length."""
-    k = np.arange(BINS // 2 + 1)
-    f = np.fft.rfft(spectrum) * np.exp(-2 * (k * _SMOOTHING) ** 2)
-    f[0] = 0
-    return np.asarray(f / max(float(np.linalg.norm(np.fft.irfft(f, BINS))), 1e-12))
+    """Fourier coefficients of the spectrum modulo a right angle, smoothed, without mean."""
+    return np.asarray(np.fft.rfft(spectrum)[::2] * _SMOOTHED)

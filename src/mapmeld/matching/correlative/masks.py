@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -47,11 +47,11 @@ def map_masks(grid: OccupancyGrid) -> MapMasks | None:
     wall = cv2.inRange(cells[cut], OCCUPIED_FROM, OCCUPIED) if width else known
     if not width or not cv2.countNonZero(wall):
         return None
-    x, y = grid.lattice_to_metres((left, bottom))
+    corner = grid.origin @ Pose2(left * grid.resolution, bottom * grid.resolution)
     return MapMasks(
         wall=wall,
         floor=cv2.inRange(cells[cut], 0, FREE_UP_TO),
         known=np.ascontiguousarray(known[cut]),
         resolution=grid.resolution,
-        origin=Pose2(float(x), float(y), grid.origin.theta),
+        origin=replace(corner, theta=grid.origin.theta),
     )

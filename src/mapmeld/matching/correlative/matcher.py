@@ -5,6 +5,7 @@ Both maps play the same part: the answer for (b, a) is the inverse of that for (
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,23 +17,22 @@ from mapmeld.matching.correlative.covariance import of_inverse, transform_covari
 from mapmeld.matching.correlative.evidence import HIT, Evidence, quick_scores, weigh
 from mapmeld.matching.correlative.parameters import CorrelativeParameters
 from mapmeld.matching.correlative.prepared_map import PreparedMap, prepare
-from mapmeld.matching.correlative.probability import ProbabilityModel, fitted_model
+from mapmeld.matching.correlative.probability import ProbabilityModel, fitted_model, surplus_of_others
 from mapmeld.matching.correlative.search import search
 from mapmeld.matching.correlative.wall_map import Doubles, WallMap
 from mapmeld.matching.result import Alternative, MatchResult, Verdict
-from mapmeld.se2 import wrap_angle
 
 COARSE_SCALES, COARSE_POINTS = (0.8, 0.6, 0.4), 160
-FINE_SCALES, FINE_POINTS = (0.3, 0.2, 0.15, 0.15), 600
-LOOKED_AT = 4  # transforms for which the full evidence is measured
+FINE_SCALES, FINE_POINTS = (0.4, 0.3, 0.2, 0.15, 0.15), 600
+LOOKED_AT = 6  # transforms for which the full evidence is measured
 UNBENT_KEEPS = 0.8  # share of the walls explained as they lie that a transform found by bending must keep
 RIVAL_SCORE = 0.0  # even odds if the mode stood alone
 RIVAL_EXPLAINS = 0.95  # of the share of walls that the best mode explains
 RIVAL_CONTRADICTED = 0.01  # more, as a share of the walls, than in the best mode
 RIVAL_CLEAN = 0.05  # share of the walls contradicted from which the maps themselves tell against it
-FIXED_LEAST = 2.0  # [m] of wall that must fix every direction
+FIXED_LEAST = 4.0  # [m] of wall that must fix every direction
 WALL_LEAST = 40.0  # [m] of wall of both maps in the overlap; the probability was fitted on more
-APART = 0.5  # [m] modes nearer than this (or than the maps bend) are one
+APART = 0.7  # [m] modes nearer than this (or than the maps bend) are one
 APART_TURNED = 0.09  # [rad]
 
 
@@ -47,7 +47,7 @@ class Mode:
     evidence
         What speaks for it.
     score
-        Of the probability model.
+        Of the probability model, as if there were no other modes.
     """
 
     local: Doubles
@@ -96,9 +96,11 @@ def _most_promising(walls_a: WallMap, walls_b: WallMap, transforms: Doubles) -> 
     """Return the rows worth a full look, none of them a repetition of a better one."""
     quick = quick_scores(walls_a, walls_b, transforms, 2 * COARSE_POINTS)
     quick[0] = np.inf  # the search's own favourite always gets its full look
+    metres, radians = _apart(walls_b, transforms)
+    differ = (metres > 0.4) | (radians > 0.05)
     kept: list[int] = []
     for k in np.argsort(-quick, kind="stable"):
-        if all(_differ(walls_b, transforms[k], transforms[j], 0.4, 0.05) for j in kept):
+        if differ[k, kept].all():
             kept.append(int(k))
     return kept[:LOOKED_AT]
 
@@ -122,26 +124,32 @@ def _weighed(walls_a: WallMap, walls_b: WallMap, transforms: Doubles, model: Pro
 
 
 def _distinct(walls_b: WallMap, modes: Sequence[Mode]) -> list[Mode]:
-    """Return modes that truly differ, best first; of those that do not, the one that fits best unbent."""
-    groups: list[list[Mode]] = []
-    for mode in modes:
+    """Return modes that truly differ, best first; of those that do not, the one that fits best unbent.
+
+    Modes are one if they are near one another as they lie, or as bending moves them.
+    """
+    count = len(modes)
+    transforms = np.array([mode.local for mode in modes] + [mode.evidence.unbent for mode in modes])
+    metres, radians = _apart(walls_b, transforms)
+    metres[radians > APART_TURNED] = np.inf
+    nearest = metres.reshape(2, count, 2, count).min(axis=(0, 2))
+    groups: list[list[int]] = []
+    for k in range(count):
         for group in groups:
-            reach = max(APART, 1.5 * group[0].evidence.bend)
-            if not _differ(walls_b, mode.local, group[0].local, reach, APART_TURNED):
-                group.append(mode)
+            if nearest[k, group[0]] <= max(APART, 1.5 * modes[group[0]].evidence.bend):
+                group.append(k)
                 break
         else:
-            groups.append([mode])
-    return [max(group, key=lambda mode: mode.evidence.hit) for group in groups]
+            groups.append([k])
+    return [max((modes[k] for k in group), key=lambda mode: mode.evidence.hit) for group in groups]
 
 
-def _differ(walls_b: WallMap, s: Doubles, t: Doubles, metres: float, radians: float) -> bool:
-    """Whether two transforms turn b differently or put its middle at different places."""
-    if abs(wrap_angle(float(s[2] - t[2]))) > radians:
-        return True
-    turn, shift = turn_and_shift(np.stack([s, t]))
+def _apart(walls_b: WallMap, t: Doubles) -> tuple[Doubles, Doubles]:
+    """How far apart (k, k) transforms t (k, 3) put the middle of b [m], and how differently they turn it."""
+    turn, shift = turn_and_shift(t)
     middle = turn[:, 0] * walls_b.points[:200].mean() + shift[:, 0]
-    return bool(abs(middle[0] - middle[1]) > metres)
+    turned = np.remainder(t[:, 2] - t[:, 2, None] + math.pi, math.tau) - math.pi
+    return np.abs(middle - middle[:, None]), np.abs(turned)
 
 
 def mode_probabilities(modes: Sequence[Mode], model: ProbabilityModel) -> Doubles:
@@ -150,14 +158,21 @@ def mode_probabilities(modes: Sequence[Mode], model: ProbabilityModel) -> Double
     What the model says, less where it cannot know: where next to no wall fixes some direction, so that
     the maps slide along one another, or with less wall than it was fitted on.
     """
-    doubt = [
-        min(1.0, mode.evidence.weak / FIXED_LEAST) * min(1.0, mode.evidence.wall / WALL_LEAST)
-        for mode in modes
-    ]
-    return np.asarray(model.probabilities(_level_rivals(modes)) * np.array(doubt))
+    trust = [_fixed(mode.evidence) * _enough(mode.evidence) for mode in modes]
+    by_chance = model.chance * surplus_of_others([mode.evidence for mode in modes], LOOKED_AT)
+    scores = np.array([mode.score for mode in modes]) - by_chance
+    return np.asarray(model.probabilities(_level_rivals(modes, scores)) * np.array(trust))
 
 
-def _level_rivals(modes: Sequence[Mode]) -> list[float]:
+def _fixed(found: Evidence) -> float:
+    return min(1.0, found.weak / FIXED_LEAST)
+
+
+def _enough(found: Evidence) -> float:
+    return min(1.0, found.wall / WALL_LEAST)
+
+
+def _level_rivals(modes: Sequence[Mode], scores: Doubles) -> list[float]:
     """Return the modes' scores, those of rivals raised to the best's.
 
     A rival explains what it covers as well as the best does what that covers, next to nothing
@@ -165,18 +180,18 @@ def _level_rivals(modes: Sequence[Mode]) -> list[float]:
     only covers more, which in a place that repeats itself says nothing: the maps would fit equally
     well one room further on.
     """
-    best = modes[0]
-    explained, contradicted = best.evidence.shares
-    scores = []
-    for mode in modes:
+    best = float(scores[0])
+    explained, contradicted = modes[0].evidence.shares
+    levelled = []
+    for mode, score in zip(modes, scores.tolist(), strict=True):
         its_explained, its_contradicted = mode.evidence.shares
         rival = (
             mode.score > RIVAL_SCORE
             and its_explained >= RIVAL_EXPLAINS * explained
             and its_contradicted <= min(contradicted + RIVAL_CONTRADICTED, RIVAL_CLEAN)
         )
-        scores.append(best.score if rival else min(mode.score, best.score))
-    return scores
+        levelled.append(best if rival else min(score, best))
+    return levelled
 
 
 # ---------------------------------------------------------------------- the answer
@@ -190,7 +205,7 @@ def _answer(
     )
     if probabilities[0] >= accept:
         verdict = Verdict.ACCEPTED
-    elif best.weak < FIXED_LEAST and modes[0].score > RIVAL_SCORE:
+    elif best.weak < FIXED_LEAST and _enough(best) / (1 + math.exp(-modes[0].score)) > 0.5:
         verdict = Verdict.AMBIGUOUS
         reason += f"; only {best.weak:.1f} m of it fix the place along the others"
     elif probabilities.sum() >= accept:
@@ -220,7 +235,7 @@ def _answer(
 
 def _similarity(walls_a: WallMap, walls_b: WallMap, found: Evidence) -> float:
     """Jaccard similarity of the walls by their length: explained within `HIT` / of either map."""
-    total = sum(w.metres * len(w.points) for w in (walls_a, walls_b))
+    total = float(walls_a.metres.sum() + walls_b.metres.sum())
     shared = min(found.hit / 2, total / 2)
     return shared / (total - shared)
 

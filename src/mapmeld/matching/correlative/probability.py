@@ -19,7 +19,8 @@ class ProbabilityModel:
     """Conditional logit (McFadden 1974) over the modes of a pair of maps and "none of them".
 
     P(mode i is right) = exp(s_i) / (1 + sum_j exp(s_j)), s = bias + sum of weight x figure, so that
-    modes which explain the maps equally well share the probability among them.
+    modes which explain the maps equally well share the probability among them. What the others reach
+    on average is what chance reaches with these two maps; the higher, the less s is worth.
 
     Attributes
     ----------
@@ -27,13 +28,16 @@ class ProbabilityModel:
         Of s.
     weights
         By the name of a figure of `Evidence`.
+    chance
+        Weight of `surplus_of_others`, taken off s.
     """
 
     bias: float
     weights: Mapping[str, float]
+    chance: float = 0.0
 
     def score(self, evidence: Evidence) -> float:
-        """Return s of a mode."""
+        """Return s of a mode if the others reached nothing."""
         return self.bias + sum(w * float(getattr(evidence, name)) for name, w in self.weights.items())
 
     def probabilities(self, scores: Sequence[float]) -> Doubles:
@@ -50,4 +54,11 @@ def fitted_model() -> ProbabilityModel:
     `benchmarks/fit_probability.py` fits them; docs/methods.md says on which maps.
     """
     raw = json.loads(files(__package__).joinpath("probability.json").read_text(encoding="utf-8"))
-    return ProbabilityModel(float(raw["bias"]), {str(k): float(v) for k, v in raw["weights"].items()})
+    weights = {str(name): float(weight) for name, weight in raw["weights"].items()}
+    return ProbabilityModel(float(raw["bias"]), weights, float(raw["chance"]))
+
+
+def surplus_of_others(modes: Sequence[Evidence], looked_at: int) -> Doubles:
+    """Return for each mode the mean surplus of the others; of `looked_at` modes, those not found count 0."""
+    surplus = np.array([mode.surplus for mode in modes])
+    return np.asarray((surplus.sum() - surplus) / (looked_at - 1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -62,40 +62,48 @@ def reduce_map(masks: MapMasks) -> ReducedMap:
     k = max(1, round(REDUCED_CELL / masks.resolution))
     cell = masks.resolution * k
     margin = math.ceil(4 * SPECTRUM_BLUR / cell)
-    covered = _with_border(pooled(masks.wall, k), margin)
+    covered = _with_border(shares(masks.wall, k), margin)
     wall = cv2.inRange(covered, 1, 255)
-    floor = _with_border(pooled(masks.floor, k), margin)
+    floor = _with_border(shares(masks.floor, k), margin)
     floor[wall > 0] = 0
     known = cv2.max(wall, cv2.inRange(floor, 128, 255))
     spectrum = direction_spectrum(covered, cell)
     main = main_direction(spectrum)
-    at_row, at_col = np.nonzero(wall)
-    points = (np.stack([at_col, at_row], axis=1).astype(np.float32) + np.float32(0.5)) * np.float32(cell)
+    # A row for x and one for y: what is done to them is several times as fast then.
+    points = (np.stack(places(wall)[::-1]).astype(np.float32) + np.float32(0.5)) * np.float32(cell)
     middle = _middle(points, main)
-    x, y = masks.origin.apply(middle - margin * cell)
+    x, y = middle.tolist()
+    mid = masks.origin @ Pose2(x - margin * cell, y - margin * cell)
     return ReducedMap(
         cell=cell,
         wall=wall,
         floor=floor,
         known=known,
-        middle=(float(middle[0] / cell), float(middle[1] / cell)),
-        T_map_mid=Pose2(float(x), float(y), masks.origin.theta),
+        middle=(x / cell, y / cell),
+        T_map_mid=replace(mid, theta=masks.origin.theta),
         spectrum=spectrum,
         main_direction=main,
-        points=points - middle,
+        points=(points - middle[:, None]).T,
         area=cv2.countNonZero(known) * cell**2,
     )
 
 
 def _middle(points: NDArray[np.float32], direction: float) -> NDArray[np.float32]:
-    """Middle of the box around the points that is turned by `direction`."""
-    if not len(points):
+    """Middle of the box around the points (2, n) that is turned by `direction`."""
+    if not points.size:
         return np.zeros(2, np.float32)
     c, s = math.cos(direction), math.sin(direction)
     axes = np.array([[c, s], [-s, c]], np.float32)
-    u = points @ axes.T
-    middle: NDArray[np.float32] = (u.min(axis=0) + u.max(axis=0)) / 2 @ axes
+    u = axes @ points
+    middle: NDArray[np.float32] = (u.min(axis=1) + u.max(axis=1)) / 2 @ axes
     return middle
+
+
+def places(mask: Image) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns where a mask is not 0, in the mask's order: `np.nonzero`, ten times as fast."""
+    at = np.flatnonzero(mask != 0)
+    row = at // mask.shape[1]
+    return row, at - row * mask.shape[1]
 
 
 def pooled(image: Image, k: int) -> Image:
@@ -108,6 +116,21 @@ def pooled(image: Image, k: int) -> Image:
     rows, cols = image.shape
     image = cv2.copyMakeBorder(image, 0, -rows % k, 0, -cols % k, cv2.BORDER_CONSTANT)
     return cv2.resize(image, (image.shape[1] // k, image.shape[0] // k), interpolation=cv2.INTER_AREA)
+
+
+def shares(mask: Image, k: int) -> Image:
+    """Share of k x k blocks where a mask (0 or 255) holds, 0..255: `pooled`, faster."""
+    if k not in (4, 8):
+        return pooled(mask, k)
+    # OpenCV halves an image many times as fast as it shrinks it by other numbers. With this value in
+    # place of 255 every half is a whole number.
+    whole = 256 - k * k
+    rows, cols = mask.shape
+    halved: Image = cv2.copyMakeBorder(mask, 0, -rows % k, 0, -cols % k, cv2.BORDER_CONSTANT)
+    np.bitwise_and(halved, whole, out=halved)
+    for _ in range(k.bit_length() - 1):
+        halved = pooled(halved, 2)
+    return cv2.convertScaleAbs(halved, alpha=255 / whole)
 
 
 def _with_border(image: Image, margin: int) -> Image:

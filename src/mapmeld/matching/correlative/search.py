@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -110,8 +111,8 @@ def _correlate(a: ReducedMap, b: ReducedMap, directions: Sequence[float]) -> Row
     # a is turned so that its walls are parallel to the raster: its box is smallest then.
     base = -a.main_direction
     extent_a = _extent(a.points, base)
-    extents_b = [_extent(b.points, directions[0] + base + quarter * math.pi / 2) for quarter in range(2)]
-    side = math.sqrt(float(np.mean([np.prod(extent_a + e) for e in extents_b])))
+    extents_b = [_extent(b.points, direction + base) for direction in directions]
+    side = math.sqrt(float(np.mean([np.prod(extent_a + e) for e in (extents_b[0], extents_b[0][::-1])])))
     cell = CELL_MIN * max(1.0, side / CELL_GROWS) ** CELL_POWER
     step = min(STEP_MAX, math.degrees(cell / (STEP_ARM * side)))
     count = min(STEPS_MAX, math.ceil(FAN_HALF / step - 1e-9))
@@ -120,34 +121,40 @@ def _correlate(a: ReducedMap, b: ReducedMap, directions: Sequence[float]) -> Row
     signed_a, signed_b = (_signed(m, cell) for m in (a, b))
     known_a, known_b = (_Raster.reduced(m.known, m, coarse).as_float() for m in (a, b))
     least = OVERLAP_MIN * min(a.area, b.area) / coarse**2
+    turned_a, turned_known_a = signed_a.turned(base, cell), known_a.turned(base, coarse)
     c, s = math.cos(base), math.sin(base)
     found = []
-    for direction in directions:
+    for direction, extent_b in zip(directions, extents_b, strict=True):
+        fan = [signed_b.turned(direction + turn + base, cell) for turn in turns]
+        turned_known_b = known_b.turned(direction + base, coarse)
         for quarter in range(2):
+            if quarter:
+                fan = [cv2.rotate(image, cv2.ROTATE_90_CLOCKWISE) for image in fan]
+                turned_known_b = cv2.rotate(turned_known_b, cv2.ROTATE_90_CLOCKWISE)
             theta = direction + quarter * math.pi / 2
             # Room for b turned by the middle of the fan; what juts out at its ends wraps around.
-            size = extent_a + _extent(b.points, theta + base)
+            size = extent_a + (extent_b[::-1] if quarter else extent_b)
             shape = (_fft_side(size[0] / cell), _fft_side(size[1] / cell))
             coarse_shape = (_fft_side(size[0] / coarse), _fft_side(size[1] / coarse))
             columns, lines = (np.fft.fftfreq(n, 1 / n).astype(np.float32) for n in shape)
-            at_x, at_y = np.meshgrid(
-                columns / KNOWN_STEP % coarse_shape[0], lines / KNOWN_STEP % coarse_shape[1]
+            from_column, from_line = (
+                _interpolation(at / KNOWN_STEP, n)
+                for at, n in zip((columns, lines), coarse_shape, strict=True)
             )
-            spectrum_a = cv2.dft(signed_a.turned(base, cell, shape))
-            known_spectrum_a = cv2.dft(known_a.turned(base, coarse, coarse_shape))
-            known_spectrum_b = cv2.dft(known_b.turned(theta + base, coarse, coarse_shape))
-            spectra_b = [cv2.dft(signed_b.turned(theta + t + base, cell, shape)) for t in turns]
+            # The inverse transform's scale is taken along by a, once for all correlations.
+            spectrum_a = _spectrum(turned_a, shape, cv2.DFT_SCALE)
+            known_spectrum_a = _spectrum(turned_known_a, coarse_shape, cv2.DFT_SCALE)
+            known_spectrum_b = _spectrum(turned_known_b, coarse_shape)
+            spectra_b = [_spectrum(image, shape) for image in fan]
             for half in range(2):
                 both = _correlation(known_spectrum_a, known_spectrum_b, half)
                 both = cv2.pow(cv2.max(both, least), -AREA_POWER)
-                both = cv2.copyMakeBorder(both, 0, 1, 0, 1, cv2.BORDER_WRAP)
                 got = [_correlation(spectrum_a, f, half) for f in spectra_b]
                 best = got[0].copy()
                 for other in got[1:]:
                     cv2.max(best, other, dst=best)
-                best *= cv2.remap(both, at_x, at_y, cv2.INTER_LINEAR)
-                peak = (best >= cv2.dilate(best, _AROUND)) & (best > 0)
-                top = np.flatnonzero(peak)
+                best *= from_line @ both @ from_column.T
+                top = np.flatnonzero((best >= cv2.dilate(best, _AROUND)) & (best > 0))
                 value = best.ravel()[top]
                 if len(top) > PEAKS:
                     order = np.argpartition(-value, PEAKS - 1)[:PEAKS]
@@ -192,12 +199,39 @@ class _Raster:
         """Bytes 0..255 as 0..1."""
         return replace(self, image=self.image.astype(np.float32) * np.float32(1 / 255))
 
-    def turned(self, theta: float, cell: float, shape: tuple[int, int]) -> Image:
-        """Sample on a raster of `shape` (cols, rows), the map turned by theta about its middle."""
+    def turned(self, theta: float, cell: float) -> Image:
+        """Sample the whole map, turned by theta about its middle, which stays in the middle of the image."""
         c, s = math.cos(theta) * cell / self.cell, math.sin(theta) * cell / self.cell
         m = np.array([[c, s, 0.0], [-s, c, 0.0]])
+        rows, cols = self.image.shape
+        reach_x, reach_y = (
+            max(at + 1, n - at) for at, n in zip(self.centre, (cols, rows), strict=True)
+        )  # a pixel further than the outermost centres, where the map fades out
+        c, s = abs(c) / (c * c + s * s), abs(s) / (c * c + s * s)
+        shape = (2 * math.ceil(c * reach_x + s * reach_y), 2 * math.ceil(s * reach_x + c * reach_y))
         m[:, 2] = np.array(self.centre) - m[:, :2] @ ((np.array(shape) - 1) / 2)
         return cv2.warpAffine(self.image, m, shape, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+
+
+def _spectrum(image: Image, shape: tuple[int, int], flags: int = 0) -> Image:
+    """Spectrum of an image cut or filled up with 0 to `shape` (cols, rows) about its middle; all even."""
+    rows, cols = image.shape
+    right, top = (shape[0] - cols) // 2, (shape[1] - rows) // 2
+    image = image[max(0, -top) : rows + min(0, top), max(0, -right) : cols + min(0, right)]
+    right, top = max(0, right), max(0, top)
+    return cv2.dft(cv2.copyMakeBorder(image, top, top, right, right, cv2.BORDER_CONSTANT), flags=flags)
+
+
+def _interpolation(at: NDArray[Any], n: int) -> NDArray[np.float32]:
+    """Matrix (len(at), n) that takes n values, repeated for ever, to those in between at `at`."""
+    before = np.floor(at)
+    share = at - before
+    before = before.astype(np.intp)
+    rows = np.arange(len(at))
+    weights = np.zeros((len(at), n), np.float32)
+    weights[rows, before % n] = 1 - share
+    weights[rows, (before + 1) % n] += share
+    return weights
 
 
 def _correlation(spectrum_a: Image, spectrum_b: Image, half_turn: int) -> Image:
@@ -207,12 +241,12 @@ def _correlation(spectrum_a: Image, spectrum_b: Image, half_turn: int) -> Image:
     in the answer.
     """
     product = cv2.mulSpectrums(spectrum_a, spectrum_b, 0, conjB=not half_turn)
-    return cv2.dft(product, flags=cv2.DFT_INVERSE | cv2.DFT_SCALE)
+    return cv2.dft(product, flags=cv2.DFT_INVERSE)
 
 
 def _extent(points: NDArray[np.float32], theta: float) -> Rows:
     c, s = math.cos(theta), math.sin(theta)
-    reach: Rows = np.abs(points @ np.array([[c, s], [-s, c]], np.float32)).max(axis=0).astype(np.float64)
+    reach: Rows = np.abs(np.array([[c, -s], [s, c]], np.float32) @ points.T).max(axis=1).astype(np.float64)
     return 2 * reach + 1.0
 
 
@@ -226,15 +260,17 @@ def _fft_side(cells: float) -> int:
 def _distinct(rows: Rows) -> list[Rows]:
     """Return the best `LISTED` rows (x, y, theta, score; best first) that are not near a better one."""
     rows = rows[: 5 * LISTED]
-    x, y, turn = rows[:, 0], rows[:, 1], rows[:, 2]
+    (x, y), turn = rows[:, :2].T.astype(np.float32), rows[:, 2]
     near = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2 < APART_METRES**2
     heading = np.stack([np.cos(turn), np.sin(turn)])
     near &= heading.T @ heading > math.cos(APART_RADIANS)
+    far = ~near
     kept: list[int] = []
     alive = np.ones(len(rows), np.bool_)
-    while len(kept) < LISTED and alive.any():
+    while len(kept) < min(LISTED, len(rows)):
         best = int(alive.argmax())
+        if not alive[best]:
+            break
         kept.append(best)
-        alive &= ~near[best]
-        alive[best] = False
+        alive &= far[best]
     return [rows[k] for k in kept]

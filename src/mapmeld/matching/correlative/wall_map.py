@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmeld.matching.correlative.masks import Image, MapMasks
+from mapmeld.matching.correlative.reduced_map import places, shares
 from mapmeld.se2 import Pose2
 
 Floats = NDArray[np.float32]
@@ -54,7 +55,7 @@ class WallMap:
     lines
         Unit normals (n,) of the lines that the points lie on, thick walls included; 0 where there is none.
     metres
-        Length of wall that one point stands for [m].
+        Length of wall that each point stands for (n,) [m].
     floor
         Sample of known places (m,) [m].
     area
@@ -70,148 +71,150 @@ class WallMap:
     normals: Plane
     straight: Floats
     lines: Plane
-    metres: float
+    metres: Floats
     floor: Plane
     area: float
 
     def at(self, z: Plane) -> Index:
         """Return flat field indices of points of the local frame; outside is the (unknown) border."""
         rows, cols = self.shape
-        scale, border = np.float32(1 / self.cell), np.float32(BORDER)
-        c = np.minimum(np.maximum(z.real * scale + border, 0), cols - 1).astype(np.intp)
-        r = np.minimum(np.maximum(z.imag * scale + border, 0), rows - 1).astype(np.intp)
-        return np.asarray(r * cols + c)
+        scale = np.float32(1 / self.cell)
+        row, col = z.imag * scale, z.real * scale
+        for at, last in ((row, rows - 1), (col, cols - 1)):
+            at += np.float32(BORDER)
+            np.maximum(at, 0, out=at)
+            np.minimum(at, last, out=at)
+        flat = row.astype(np.intp)
+        flat *= cols
+        flat += col.astype(np.intp)
+        return flat
 
 
 def wall_map(masks: MapMasks) -> WallMap:
     """Compute the fields and wall points of a map."""
     wall = masks.wall
-    row, col = np.nonzero(wall != 0)
     k = max(1, round(FIELD_CELL / masks.resolution))
     while wall.size / k**2 > MAX_FIELD_CELLS:
         k += 1
     cell = masks.resolution * k
     shape = (-(-wall.shape[0] // k) + 2 * BORDER, -(-wall.shape[1] // k) + 2 * BORDER)
-    wall_points = _wall_points(row, col, k, shape)
+    wall_points = _wall_points(wall, k, shape)
     own, n = wall_points.own, len(wall_points.own)
 
-    walls = np.zeros(shape[0] * shape[1], np.uint8)
-    walls[own] = 255
-    walls = walls.reshape(shape)
+    no_wall = np.full(shape[0] * shape[1], 255, np.uint8)
+    no_wall[own] = 0
+    no_wall = no_wall.reshape(shape)
     _, labels = cv2.distanceTransformWithLabels(
-        255 - walls, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+        no_wall, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
-    labels = labels.ravel()
-    order = np.random.default_rng(0).permutation(n)
-    place = np.empty(n, np.int32)
-    place[order] = np.arange(n, dtype=np.int32)
+    label = np.asarray(labels, np.int32).ravel()
     of_label = np.zeros(n + 1, np.int32)
-    of_label[labels[own]] = place
+    of_label[label[own]] = np.arange(n, dtype=np.int32)
 
-    is_free = ((_share(masks.floor, k, shape) > 127) & (walls == 0)).view(np.uint8)
-    depth = cv2.distanceTransform(is_free, cv2.DIST_L2, cv2.DIST_MASK_5) * np.float32(cell)
-    is_known = (_share(masks.known, k, shape) > 127) | (walls > 0)
+    is_free = cv2.min(_with_border(cv2.inRange(shares(masks.floor, k), 128, 255)), no_wall)
+    depth: Image = cv2.distanceTransform(is_free, cv2.DIST_L2, cv2.DIST_MASK_5)
+    depth *= np.float32(cell)
+    is_known = (_with_border(shares(masks.known, k)) > 127) | (no_wall == 0)
     depth[~is_known] = -1
     floor = np.flatnonzero(is_known)
     step = max(1, len(floor) // FLOOR_SAMPLE)
     floor = floor[step // 2 :: step]
-    floor_row, floor_col = np.divmod(floor, shape[1])
+    floor_row = floor // shape[1]
+    floor_place = np.empty(len(floor), np.complex64)
+    floor_place.imag = (floor_row + (0.5 - BORDER)) * cell
+    floor_place.real = (floor - floor_row * shape[1] + (0.5 - BORDER)) * cell
     return WallMap(
         frame=masks.origin,
         cell=cell,
         shape=shape,
         depth=depth.ravel(),
-        nearest=of_label[labels],
-        points=(wall_points.place[order] * cell).astype(np.complex64),
-        normals=wall_points.normal[order].astype(np.complex64),
-        straight=wall_points.straight[order].astype(np.float32),
-        lines=wall_points.line[order].astype(np.complex64),
-        metres=cell,
-        floor=((floor_col - BORDER + 0.5 + 1j * (floor_row - BORDER + 0.5)) * cell).astype(np.complex64),
+        nearest=of_label.take(label),
+        points=(wall_points.place * cell).astype(np.complex64),
+        normals=wall_points.normal.astype(np.complex64),
+        straight=wall_points.straight.astype(np.float32),
+        lines=wall_points.line.astype(np.complex64),
+        metres=(wall_points.length * cell).astype(np.float32),
+        floor=floor_place,
         area=cv2.countNonZero(masks.known) * masks.resolution**2,
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _WallPoints:
-    """One point for each field cell that holds wall; places in field cells."""
+    """One point for each field cell that holds wall; places and lengths in field cells."""
 
     own: Index  # flat field index
     place: NDArray[np.complex128]
     normal: NDArray[np.complex128]
     straight: Doubles
     line: NDArray[np.complex128]
+    length: Doubles  # of wall that the point stands for
 
 
-def _wall_points(row: Index, col: Index, k: int, shape: tuple[int, int]) -> _WallPoints:
-    """Find the wall points of the map cells (row, col), k x k of which make a field cell.
+def _wall_points(wall: Image, k: int, shape: tuple[int, int]) -> _WallPoints:
+    """Find the wall points of a map's cells, k x k of which make a field cell.
 
     A point is moved onto the wall's middle line, found from the first and second moments of the wall
     cells in the 3 x 3 field cells around it. This takes the raggedness of a cell out of the walls.
-    A thick wall looks like a blob to them; whether it is a line after all, 5 x 5 tell.
+    A thick wall looks like a blob to them; whether it is a line after all, 5 x 5 tell. Where a wall
+    takes up several field cells side by side, they share its length.
     """
     width = shape[1]
+    row, col = places(wall)
     flat = (row // k + BORDER) * width + (col // k + BORDER)
-    holds = np.zeros(shape[0] * width, bool)
+    holds = np.zeros(shape[0] * width, np.bool_)
     holds[flat] = True
-    own = np.flatnonzero(holds)
+    # In any order: the first k of them are a fair sample then.
+    own = np.random.default_rng(0).permutation(np.flatnonzero(holds))
     n = len(own)
     place = np.full(shape[0] * width, n, np.int32)
     place[own] = np.arange(n, dtype=np.int32)
-    x, y = (col % k + 0.5) / k, (row % k + 0.5) / k
+    # In half cells centres are whole numbers: their sums and differences are exact, wherever they lie.
+    x, y = (2 * v + (2 * k * BORDER + 1.0) for v in (col, row))
     i = place[flat]
     # Row n stays empty: it answers for neighbours without wall.
-    m = np.stack([np.bincount(i, v, n + 1) for v in (None, x, y, x * x, x * y, y * y)], axis=1).astype(
-        np.float64
-    )
-    along, straight, middle = _lines(m, place, own, width, reach=1)
+    m = np.empty((n + 1, 7))
+    for column, weight in enumerate((None, x, y, x * x, x * y, y * y)):
+        m[:, column] = np.bincount(i, weight, n + 1)
+    m[:n, 6], m[n, 6] = 1, 0  # counts field cells
+    along, straight, middle, length = _lines(m, place, own, width, reach=1)
     line = np.where(straight > STRAIGHT_LEAST, along * 1j, 0)
     blob = np.flatnonzero(straight <= STRAIGHT_LEAST)
     if len(blob):
-        along_wide, straight_wide, _ = _lines(m, place, own[blob], width, reach=2)
+        along_wide, straight_wide, _, length[blob] = _lines(m, place, own[blob], width, reach=2)
         line[blob] = np.where(straight_wide > STRAIGHT_LEAST, along_wide * 1j, 0)
     mine = (m[:n, 1] + 1j * m[:n, 2]) / m[:n, 0]
     on_line = middle + along * ((mine - middle) * along.conj()).real
-    row_of, col_of = np.divmod(own, width)
-    corner = (col_of - BORDER) + 1j * (row_of - BORDER)
-    spot = corner + np.where(straight > STRAIGHT_LEAST, on_line, mine)
-    return _WallPoints(own, spot, along * 1j, straight, line)
+    spot = np.where(straight > STRAIGHT_LEAST, on_line, mine) / (2 * k) - (1 + 1j) * BORDER
+    return _WallPoints(own, np.asarray(spot), along * 1j, straight, line, length / (2 * k))
 
 
 def _lines(
     m: Doubles, place: NDArray[np.int32], own: Index, width: int, reach: int
-) -> tuple[NDArray[np.complex128], Doubles, NDArray[np.complex128]]:
+) -> tuple[NDArray[np.complex128], Doubles, NDArray[np.complex128], Doubles]:
     """Fit a line to the wall around each of the field cells `own`, `reach` field cells to every side.
 
-    Returns its direction, how straight the wall is, and its middle, seen from the cell's corner.
+    Returns its direction, how straight the wall is, its middle, and the length of it that falls to each
+    of the field cells; in half cells of the map.
     """
-    s = np.zeros((len(own), 6))
+    s = np.zeros((len(own), 7))
     for dy in range(-reach, reach + 1):
         for dx in range(-reach, reach + 1):
-            a = m[place[own + (dy * width + dx)]]
-            s += a  # then from the neighbour's corner to one's own
-            if dx:
-                s[:, 1] += dx * a[:, 0]
-                s[:, 3] += 2 * dx * a[:, 1] + dx * dx * a[:, 0]
-                s[:, 4] += dx * a[:, 2]
-            if dy:
-                s[:, 2] += dy * a[:, 0]
-                s[:, 4] += dy * a[:, 1] + dx * dy * a[:, 0]
-                s[:, 5] += 2 * dy * a[:, 2] + dy * dy * a[:, 0]
-    count, mx, my = s[:, 0], s[:, 1] / s[:, 0], s[:, 2] / s[:, 0]
-    xx, xy, yy = s[:, 3] / count - mx * mx, s[:, 4] / count - mx * my, s[:, 5] / count - my * my
-    half, root = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
-    along = np.exp(0.5j * np.arctan2(2 * xy, xx - yy))
-    straight = np.where(count >= 3, np.clip(1 - 3 * (half - root) / np.maximum(half + root, 1e-6), 0, 1), 0)
-    return along, straight, mx + 1j * my
+            s += m.take(place.take(own + (dy * width + dx)), axis=0)
+    count, x, y, xx, xy, yy, cells = np.ascontiguousarray(s.T)
+    # Central moments times the square of count: whole numbers.
+    xx, xy, yy = count * xx - x * x, count * xy - x * y, count * yy - y * y
+    half, slant = (xx + yy) / 2, (xx - yy) / 2
+    root = np.sqrt(slant * slant + xy * xy)
+    cosine = np.where(root > 0, slant / np.maximum(root, 0.5), 1)  # of twice the angle
+    along = np.empty(len(own), np.complex128)
+    along.real, along.imag = np.sqrt((1 + cosine) / 2), np.copysign(np.sqrt((1 - cosine) / 2), xy)
+    straight = np.maximum(1 - 3 * (half - root) / np.maximum(half + root, 0.5), 0)
+    straight[count < 3] = 0
+    # What is spread evenly over a length has a twelfth of its square as variance; so has each map cell.
+    length = np.sqrt(12 * ((half + root) / (count * count) + 1 / 3)) / cells
+    return along, straight, (x + 1j * y) / count, length
 
 
-def _share(mask: Image, k: int, shape: tuple[int, int]) -> Image:
-    """Return the share of each k x k block where mask holds, 0..255, with the fields' border."""
-    rows, cols = shape[0] - 2 * BORDER, shape[1] - 2 * BORDER
-    if k > 1:
-        mask = cv2.copyMakeBorder(
-            mask, 0, rows * k - mask.shape[0], 0, cols * k - mask.shape[1], cv2.BORDER_CONSTANT, value=0
-        )
-        mask = cv2.resize(mask, (cols, rows), interpolation=cv2.INTER_AREA)
-    return cv2.copyMakeBorder(mask, BORDER, BORDER, BORDER, BORDER, cv2.BORDER_CONSTANT, value=0)
+def _with_border(image: Image) -> Image:
+    return cv2.copyMakeBorder(image, BORDER, BORDER, BORDER, BORDER, cv2.BORDER_CONSTANT)
