@@ -243,7 +243,7 @@ def _correlation(spectrum_a: Image, spectrum_b: Image, half_turn: int) -> Image:
     in the answer.
     """
     product = cv2.mulSpectrums(spectrum_a, spectrum_b, 0, conjB=not half_turn)
-    return cv2.dft(product, flags=cv2.DFT_INVERSE)
+    return cv2.dft(product, dst=product, flags=cv2.DFT_INVERSE)
 
 
 def _extent(points: NDArray[np.float32], theta: float) -> Rows:
