@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapmeld.matching.correlative.wall_map import Doubles, Floats, Index, Plane, WallMap
+from mapmeld.matching.correlative.wall_map import Cells, Doubles, Floats, Plane, WallMap
 from mapmeld.se2 import Pose2
 
 _STEP_MOST = np.array([0.5, 0.5, 0.1])  # [m, m, rad]
@@ -44,7 +44,7 @@ class WallPairs:
     normal: Plane  # of the wall that was looked up
     own: Plane  # of the wall that the point lies on
     straight: Floats  # the lesser of both
-    fields: tuple[tuple[WallMap, Index], tuple[WallMap, Index]]  # where b's points lie in a's, a's in b's
+    fields: tuple[tuple[WallMap, Cells], tuple[WallMap, Cells]]  # where b's points lie in a's, a's in b's
 
     @property
     def depth(self) -> Floats:

@@ -99,8 +99,10 @@ def _directions(a: ReducedMap, b: ReducedMap) -> list[float]:
     lags = relative_directions(a.spectrum, b.spectrum)
     out: list[float] = []
     for lag, weight in lags:
+        if weight < SECOND_WEIGHT * lags[0][1]:
+            break
         apart = [abs(math.remainder(lag - other, math.pi / 2)) for other in out]
-        if weight >= SECOND_WEIGHT * lags[0][1] and all(d > math.radians(FAN_HALF + 2) for d in apart):
+        if all(d > math.radians(FAN_HALF + 2) for d in apart):
             out.append(lag)
     return out[:DIRECTIONS_MAX]
 
@@ -122,7 +124,6 @@ def _correlate(a: ReducedMap, b: ReducedMap, directions: Sequence[float]) -> Row
     known_a, known_b = (_Raster.reduced(m.known, m, coarse).as_float() for m in (a, b))
     least = OVERLAP_MIN * min(a.area, b.area) / coarse**2
     turned_a, turned_known_a = signed_a.turned(base, cell), known_a.turned(base, coarse)
-    c, s = math.cos(base), math.sin(base)
     found = []
     for direction, extent_b in zip(directions, extents_b, strict=True):
         fan = [signed_b.turned(direction + turn + base, cell) for turn in turns]
@@ -155,18 +156,19 @@ def _correlate(a: ReducedMap, b: ReducedMap, directions: Sequence[float]) -> Row
                     cv2.max(best, other, dst=best)
                 best *= from_line @ both @ from_column.T
                 top = np.flatnonzero((best >= cv2.dilate(best, _AROUND)) & (best > 0))
-                value = best.ravel()[top]
+                value = best.take(top)
                 if len(top) > PEAKS:
                     order = np.argpartition(-value, PEAKS - 1)[:PEAKS]
                     top, value = top[order], value[order]
-                turn = turns[np.argmax(np.stack([g.ravel()[top] for g in got]), axis=0)]
+                turn = turns.take(np.argmax(np.array([g.take(top) for g in got]), axis=0))
                 row, col = np.divmod(top, shape[0])
                 # Half a turn by convolution moves the answer by one cell (see _correlation).
-                x, y = columns[(col + half) % shape[0]] * cell, lines[(row + half) % shape[1]] * cell
-                angle = theta + half * math.pi + turn
-                found.append(np.stack([c * x + s * y, c * y - s * x, angle, value], axis=1))
-    rows = np.concatenate(found)
-    return rows[np.argsort(-rows[:, 3], kind="stable")]
+                x, y = columns.take(col + half, mode="wrap"), lines.take(row + half, mode="wrap")
+                found.append((x * cell, y * cell, theta + half * math.pi + turn, value))
+    x, y, angle, value = map(np.concatenate, zip(*found, strict=True))
+    c, s = math.cos(base), math.sin(base)
+    rows = np.column_stack([c * x + s * y, c * y - s * x, angle, value])
+    return rows[np.argsort(-value, kind="stable")]
 
 
 def _signed(m: ReducedMap, cell: float) -> _Raster:
@@ -202,23 +204,23 @@ class _Raster:
     def turned(self, theta: float, cell: float) -> Image:
         """Sample the whole map, turned by theta about its middle, which stays in the middle of the image."""
         c, s = math.cos(theta) * cell / self.cell, math.sin(theta) * cell / self.cell
-        m = np.array([[c, s, 0.0], [-s, c, 0.0]])
         rows, cols = self.image.shape
-        reach_x, reach_y = (
-            max(at + 1, n - at) for at, n in zip(self.centre, (cols, rows), strict=True)
-        )  # a pixel further than the outermost centres, where the map fades out
-        c, s = abs(c) / (c * c + s * s), abs(s) / (c * c + s * s)
-        shape = (2 * math.ceil(c * reach_x + s * reach_y), 2 * math.ceil(s * reach_x + c * reach_y))
-        m[:, 2] = np.array(self.centre) - m[:, :2] @ ((np.array(shape) - 1) / 2)
-        return cv2.warpAffine(self.image, m, shape, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+        x, y = self.centre
+        # To a pixel beyond the outermost centres, where the map has faded out.
+        reach_x, reach_y = max(x + 1, cols - x), max(y + 1, rows - y)
+        along, aside = abs(c) / (c * c + s * s), abs(s) / (c * c + s * s)
+        u, v = math.ceil(along * reach_x + aside * reach_y), math.ceil(aside * reach_x + along * reach_y)
+        m = np.array([[c, s, x - c * (u - 0.5) - s * (v - 0.5)], [-s, c, y + s * (u - 0.5) - c * (v - 0.5)]])
+        return cv2.warpAffine(self.image, m, (2 * u, 2 * v), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
 
 
 def _spectrum(image: Image, shape: tuple[int, int], flags: int = 0) -> Image:
     """Spectrum of an image cut or filled up with 0 to `shape` (cols, rows) about its middle; all even."""
     rows, cols = image.shape
     right, top = (shape[0] - cols) // 2, (shape[1] - rows) // 2
-    image = image[max(0, -top) : rows + min(0, top), max(0, -right) : cols + min(0, right)]
-    right, top = max(0, right), max(0, top)
+    if right < 0 or top < 0:
+        image = image[max(0, -top) : rows + min(0, top), max(0, -right) : cols + min(0, right)]
+        right, top = max(0, right), max(0, top)
     return cv2.dft(cv2.copyMakeBorder(image, top, top, right, right, cv2.BORDER_CONSTANT), flags=flags)
 
 
@@ -241,7 +243,7 @@ def _correlation(spectrum_a: Image, spectrum_b: Image, half_turn: int) -> Image:
     in the answer.
     """
     product = cv2.mulSpectrums(spectrum_a, spectrum_b, 0, conjB=not half_turn)
-    return cv2.dft(product, flags=cv2.DFT_INVERSE)
+    return cv2.dft(product, dst=product, flags=cv2.DFT_INVERSE)
 
 
 def _extent(points: NDArray[np.float32], theta: float) -> Rows:

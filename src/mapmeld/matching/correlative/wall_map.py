@@ -22,6 +22,7 @@ Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Plane = NDArray[np.complex64]
 Index = NDArray[np.intp]
+Cells = NDArray[np.int32]
 
 FIELD_CELL = 0.1  # [m] lattice on which the nearest wall is looked up; finer detail is in the wall points
 MAX_FIELD_CELLS = 6_000_000  # larger maps get coarser fields, so that time and memory stay bounded
@@ -66,7 +67,7 @@ class WallMap:
     cell: float
     shape: tuple[int, int]
     depth: Floats
-    nearest: NDArray[np.int32]
+    nearest: Cells
     points: Plane
     normals: Plane
     straight: Floats
@@ -75,18 +76,17 @@ class WallMap:
     floor: Plane
     area: float
 
-    def at(self, z: Plane) -> Index:
+    def at(self, z: Plane) -> Cells:
         """Return flat field indices of points of the local frame; outside is the (unknown) border."""
         rows, cols = self.shape
-        scale = np.float32(1 / self.cell)
-        row, col = z.imag * scale, z.real * scale
-        for at, last in ((row, rows - 1), (col, cols - 1)):
-            at += np.float32(BORDER)
-            np.maximum(at, 0, out=at)
-            np.minimum(at, last, out=at)
-        flat = row.astype(np.intp)
+        # Real and imaginary parts side by side, x in the even places.
+        cell = z.view(np.float32) * np.float32(1 / self.cell)
+        cell += np.float32(BORDER)
+        np.maximum(cell, 0, out=cell)
+        whole = cell.astype(np.int32)
+        flat = np.minimum(whole[..., 1::2], rows - 1)
         flat *= cols
-        flat += col.astype(np.intp)
+        flat += np.minimum(whole[..., ::2], cols - 1)
         return flat
 
 
@@ -177,11 +177,13 @@ def _wall_points(wall: Image, k: int, shape: tuple[int, int]) -> _WallPoints:
     for column, weight in enumerate((None, x, y, x * x, x * y, y * y)):
         m[:, column] = np.bincount(i, weight, n + 1)
     m[:n, 6], m[n, 6] = 1, 0  # counts field cells
-    along, straight, middle, length = _lines(m, place, own, width, reach=1)
+    near = _sums(m, place, own, width, _rings(0, 1))
+    along, straight, middle, length = _lines(near)
     line = np.where(straight > STRAIGHT_LEAST, along * 1j, 0)
     blob = np.flatnonzero(straight <= STRAIGHT_LEAST)
     if len(blob):
-        along_wide, straight_wide, _, length[blob] = _lines(m, place, own[blob], width, reach=2)
+        wide = near[blob] + _sums(m, place, own[blob], width, _rings(2))
+        along_wide, straight_wide, _, length[blob] = _lines(wide)
         line[blob] = np.where(straight_wide > STRAIGHT_LEAST, along_wide * 1j, 0)
     mine = (m[:n, 1] + 1j * m[:n, 2]) / m[:n, 0]
     on_line = middle + along * ((mine - middle) * along.conj()).real
@@ -189,25 +191,33 @@ def _wall_points(wall: Image, k: int, shape: tuple[int, int]) -> _WallPoints:
     return _WallPoints(own, np.asarray(spot), along * 1j, straight, line, length / (2 * k))
 
 
-def _lines(
-    m: Doubles, place: NDArray[np.int32], own: Index, width: int, reach: int
-) -> tuple[NDArray[np.complex128], Doubles, NDArray[np.complex128], Doubles]:
-    """Fit a line to the wall around each of the field cells `own`, `reach` field cells to every side.
+def _rings(*rings: int) -> list[tuple[int, int]]:
+    """Return the field cells of square rings around one: 0 is itself, 1 the 8 around it, 2 the next 16."""
+    reach = range(-max(rings), max(rings) + 1)
+    return [(dx, dy) for dy in reach for dx in reach if max(abs(dx), abs(dy)) in rings]
 
-    Returns its direction, how straight the wall is, its middle, and the length of it that falls to each
-    of the field cells; in half cells of the map.
-    """
+
+def _sums(m: Doubles, place: Cells, own: Index, width: int, around: list[tuple[int, int]]) -> Doubles:
+    """Return the sums (len(own), 7) of the moments `m` over the field cells (dx, dy) around each of `own`."""
     s = np.zeros((len(own), 7))
-    for dy in range(-reach, reach + 1):
-        for dx in range(-reach, reach + 1):
-            s += m.take(place.take(own + (dy * width + dx)), axis=0)
+    for dx, dy in around:
+        s += m.take(place.take(own + (dy * width + dx)), axis=0)
+    return s
+
+
+def _lines(s: Doubles) -> tuple[NDArray[np.complex128], Doubles, NDArray[np.complex128], Doubles]:
+    """Fit lines to walls of which these are the moments (n, 7).
+
+    Returns their directions, how straight the walls are, their middles, and the length of them that
+    falls to each field cell; in half cells of the map.
+    """
     count, x, y, xx, xy, yy, cells = np.ascontiguousarray(s.T)
     # Central moments times the square of count: whole numbers.
     xx, xy, yy = count * xx - x * x, count * xy - x * y, count * yy - y * y
     half, slant = (xx + yy) / 2, (xx - yy) / 2
     root = np.sqrt(slant * slant + xy * xy)
     cosine = np.where(root > 0, slant / np.maximum(root, 0.5), 1)  # of twice the angle
-    along = np.empty(len(own), np.complex128)
+    along = np.empty(len(s), np.complex128)
     along.real, along.imag = np.sqrt((1 + cosine) / 2), np.copysign(np.sqrt((1 - cosine) / 2), xy)
     straight = np.maximum(1 - 3 * (half - root) / np.maximum(half + root, 0.5), 0)
     straight[count < 3] = 0
