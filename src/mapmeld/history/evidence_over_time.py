@@ -33,7 +33,7 @@ class EvidenceParameters:
     ----------
     keep_probability
         An accepted match is withdrawn where the newest maps make it less probable than this. (It is
-        accepted from the method's `accept_probability`, 0.85; between the two it is kept.)
+        accepted from the method's `accept_probability`; between the two it is kept.)
     confirm_states
         So many states in a row must agree on a match before it replaces one that was accepted, or
         comes back after one was withdrawn;

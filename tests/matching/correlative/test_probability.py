@@ -11,7 +11,12 @@ from hypothesis import strategies as st
 from mapmeld.matching import correlative
 from mapmeld.matching.correlative.evidence import Evidence
 from mapmeld.matching.correlative.matcher import Mode, mode_probabilities
-from mapmeld.matching.correlative.probability import ProbabilityModel, fitted_model, surplus_of_others
+from mapmeld.matching.correlative.probability import (
+    USUAL_SURPLUS,
+    ProbabilityModel,
+    fitted_model,
+    surplus_of_others,
+)
 
 NOTHING = ProbabilityModel(0.0, {})
 scores = st.lists(st.floats(-800, 800), min_size=1, max_size=6)
@@ -75,7 +80,8 @@ def test_what_is_shipped_trusts_plenty_of_wall_and_not_a_little() -> None:
 
     assert p(200, 0.98, 0) > 0.95
     assert p(5, 1.0, 0) < 0.5
-    assert p(200, 0.5, 0.2) < 0.05
+    assert p(200, 0.3, 0.2) < 0.05
+    assert p(200, 0.8, 0.2) < 0.05  # no drift explains that
     assert p(200, 0.9, 0.02) < p(200, 0.95, 0.01) < p(400, 0.95, 0.01)
 
 
@@ -87,9 +93,11 @@ def test_what_others_reach_is_taken_off() -> None:
 
     modes = [e(0.9), e(0.5), e(0.3)]
     own = [mode.surplus for mode in modes]
-    expected = [(own[1] + own[2]) / 5, (own[0] + own[2]) / 5, (own[0] + own[1]) / 5]
-    assert surplus_of_others(modes, 6) == pytest.approx(expected)
-    assert surplus_of_others(modes[:1], 6) == pytest.approx([0])
+    expected = [(own[1] + own[2]) / 2, (own[0] + own[2]) / 2, (own[0] + own[1]) / 2]
+    assert surplus_of_others(modes, 3) == pytest.approx(expected)
+    # What was not found counts as usual: a mode found alone is no better for it.
+    assert surplus_of_others(modes, 5) == pytest.approx([(2 * e + 2 * USUAL_SURPLUS) / 4 for e in expected])
+    assert surplus_of_others(modes[:1], 6) == pytest.approx([USUAL_SURPLUS])
     # The same best mode is worth less where the others come near to it.
     model = fitted_model()
     assert model.chance > 0
@@ -98,4 +106,4 @@ def test_what_others_reach_is_taken_off() -> None:
         found = [Mode(np.zeros(3), e(share), model.score(e(share))) for share in shares]
         return float(mode_probabilities(found, model)[0])
 
-    assert p(0.9) > p(0.9, 0.5) > p(0.9, 0.7)
+    assert p(0.9, 0.3) > p(0.9, 0.5) > p(0.9, 0.7)

@@ -3,10 +3,13 @@ import math
 import numpy as np
 import pytest
 from drawing import built, drawn, office, school, seen_from
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
 from ready import reduced
 
 from mapmeld.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from mapmeld.matching.correlative.reduced_map import pooled
+from mapmeld.matching.correlative.reduced_map import places, pooled, shares
 from mapmeld.se2 import Pose2
 
 
@@ -88,6 +91,24 @@ def test_blocks_are_averaged_and_the_last_filled_up_with_nothing(k: int) -> None
     assert small[-1, -1] == pytest.approx(255 / k**2, abs=1)
     ones = pooled(np.full((2 * k, 3 * k), 255, np.uint8), k)
     assert (ones == 255).all()
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4, 5, 8, 10, 16, 20])
+@pytest.mark.parametrize("shape", [(1, 1), (40, 80), (163, 77)])
+def test_shares_of_a_mask_are_its_averages_to_the_last_bit(k: int, shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(k)
+    # From few cells in a block on the left to nearly all on the right, and some blocks half full.
+    mask = np.where(rng.random(shape) < np.linspace(0, 1, shape[1]), 255, 0).astype(np.uint8)
+    mask[: shape[0] // 2] = np.where(np.arange(shape[1]) // max(k // 2, 1) % 2, 255, 0)
+    np.testing.assert_array_equal(shares(mask, k), pooled(mask, k))
+
+
+@given(
+    arrays(np.uint8, array_shapes(min_dims=2, max_dims=2, max_side=20), elements=st.sampled_from([0, 255]))
+)
+def test_places_are_where_a_mask_holds(mask: np.ndarray) -> None:
+    for found, expected in zip(places(mask), np.nonzero(mask), strict=True):
+        np.testing.assert_array_equal(found, expected)
 
 
 def test_a_single_obstacle_is_enough() -> None:

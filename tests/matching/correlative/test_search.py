@@ -1,5 +1,6 @@
 import math
 
+import cv2
 import numpy as np
 import pytest
 from drawing import cut, hall, office, row_of_rooms, school, seen_from
@@ -13,6 +14,9 @@ from mapmeld.matching.correlative.search import (
     LISTED,
     Hypothesis,
     _distinct,
+    _interpolation,
+    _Raster,
+    _spectrum,
     search,
 )
 from mapmeld.se2 import Pose2
@@ -117,3 +121,49 @@ def test_the_list_ends() -> None:
     assert kept() == []
     many = [(float(k), 0.0, 0.0) for k in range(3 * LISTED)]
     assert kept(*many) == many[:LISTED]
+
+
+# ---------------------------------------------------------------------- the pictures that are correlated
+PICTURE = _Raster(np.random.default_rng(2).random((31, 44)).astype(np.float32), 0.2, (20.3, 17.0))
+
+
+@given(st.floats(-math.pi, math.pi), st.sampled_from([0.2, 0.3, 0.71]))
+def test_a_picture_turned_by_a_quarter_is_the_turned_picture_turned_by_a_quarter(
+    theta: float, cell: float
+) -> None:
+    one = np.rot90(PICTURE.turned(theta, cell), -1)
+    other = PICTURE.turned(theta + math.pi / 2, cell)
+    # Rounding may decide about a row or column of nothing at the edge.
+    rows, cols = (max(n) for n in zip(one.shape, other.shape, strict=True))
+    one, other = (np.pad(i, [((rows - i.shape[0]) // 2,), ((cols - i.shape[1]) // 2,)]) for i in (one, other))
+    np.testing.assert_allclose(one, other, atol=0.05)  # OpenCV may round places to 1/32 pixel
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(0.2, 0.7))
+def test_nothing_of_a_turned_picture_is_cut_off(theta: float, cell: float) -> None:
+    whole = PICTURE.turned(theta, cell)
+    assert all(n % 2 == 0 for n in whole.shape)
+    # Each pixel stands for cell^2; that sum is the picture's own but for what sampling misses.
+    assert whole.sum() * cell**2 == pytest.approx(PICTURE.image.sum() * PICTURE.cell**2, rel=0.15)
+    dark = _Raster(np.ones((31, 44), np.float32), 0.2, (20.3, 17.0)).turned(theta, 0.2)
+    assert dark.sum() == pytest.approx(31 * 44, rel=0.01)
+
+
+@pytest.mark.parametrize("shape", [(10, 8), (20, 16), (6, 20), (20, 4), (4, 4)])
+def test_pictures_are_cut_or_filled_up_about_their_middle(shape: tuple[int, int]) -> None:
+    image = np.random.default_rng(0).random((8, 10)).astype(np.float32)
+    found = cv2.dft(_spectrum(image, shape), flags=cv2.DFT_INVERSE | cv2.DFT_SCALE)
+    expected = np.zeros(shape[::-1], np.float32)
+    for row in range(shape[1]):
+        for col in range(shape[0]):
+            r, c = row + (8 - shape[1]) // 2, col + (10 - shape[0]) // 2
+            if 0 <= r < 8 and 0 <= c < 10:
+                expected[row, col] = image[r, c]
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+@given(st.lists(st.floats(-30, 30), min_size=1, max_size=8), st.integers(1, 6))
+def test_interpolation_is_linear_between_values_that_repeat(at: list[float], n: int) -> None:
+    values = np.arange(n) ** 2.0
+    expected = np.interp(at, np.arange(-40, 41), [values[k % n] for k in range(-40, 41)])
+    np.testing.assert_allclose(_interpolation(np.array(at), n) @ values, expected, atol=1e-4)

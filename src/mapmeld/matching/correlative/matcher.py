@@ -31,7 +31,8 @@ RIVAL_EXPLAINS = 0.95  # of the share of walls that the best mode explains
 RIVAL_CONTRADICTED = 0.01  # more, as a share of the walls, than in the best mode
 RIVAL_CLEAN = 0.05  # share of the walls contradicted from which the maps themselves tell against it
 FIXED_LEAST = 4.0  # [m] of wall that must fix every direction
-WALL_LEAST = 40.0  # [m] of wall of both maps in the overlap; the probability was fitted on more
+WALL_LEAST = 36.0  # [m] of wall of both maps in the overlap; rooms that look alike can have less in common
+AT_ODDS = 0.09, 0.13  # shares of wall explained as it lies x contradicted: doubtful from, impossible from
 APART = 0.7  # [m] modes nearer than this (or than the maps bend) are one
 APART_TURNED = 0.09  # [rad]
 
@@ -156,9 +157,10 @@ def mode_probabilities(modes: Sequence[Mode], model: ProbabilityModel) -> Double
     """Return P(right) of each mode.
 
     What the model says, less where it cannot know: where next to no wall fixes some direction, so that
-    the maps slide along one another, or with less wall than it was fitted on.
+    the maps slide along one another; with little wall; and where exact agreement and contradiction meet,
+    as of two floors of one building.
     """
-    trust = [_fixed(mode.evidence) * _enough(mode.evidence) for mode in modes]
+    trust = [_fixed(m.evidence) * _enough(m.evidence) * _consistent(m.evidence) for m in modes]
     by_chance = model.chance * surplus_of_others([mode.evidence for mode in modes], LOOKED_AT)
     scores = np.array([mode.score for mode in modes]) - by_chance
     return np.asarray(model.probabilities(_level_rivals(modes, scores)) * np.array(trust))
@@ -170,6 +172,12 @@ def _fixed(found: Evidence) -> float:
 
 def _enough(found: Evidence) -> float:
     return min(1.0, found.wall / WALL_LEAST)
+
+
+def _consistent(found: Evidence) -> float:
+    """Walls that fit as they lie leave no room for drift to explain those that are contradicted."""
+    at_odds = found.hit / found.wall * found.contra / found.wall
+    return min(1.0, max(0.0, (AT_ODDS[1] - at_odds) / (AT_ODDS[1] - AT_ODDS[0])))
 
 
 def _level_rivals(modes: Sequence[Mode], scores: Doubles) -> list[float]:

@@ -18,7 +18,7 @@ class CorrelativeParameters:
         How many of the poses that the search lists, best first, are looked at more closely.
     """
 
-    accept_probability: float = 0.75
+    accept_probability: float = 0.8
     hypotheses: int = 12
 
     def __post_init__(self) -> None:

@@ -13,6 +13,8 @@ import numpy as np
 from mapmeld.matching.correlative.evidence import Evidence
 from mapmeld.matching.correlative.wall_map import Doubles
 
+USUAL_SURPLUS = 6.5  # of a mode that is not right: the median over the maps of the fit
+
 
 @dataclass(frozen=True, slots=True)
 class ProbabilityModel:
@@ -59,6 +61,7 @@ def fitted_model() -> ProbabilityModel:
 
 
 def surplus_of_others(modes: Sequence[Evidence], looked_at: int) -> Doubles:
-    """Return for each mode the mean surplus of the others; of `looked_at` modes, those not found count 0."""
+    """Return for each mode the mean surplus of the others; those missing of `looked_at` count as usual."""
     surplus = np.array([mode.surplus for mode in modes])
-    return np.asarray((surplus.sum() - surplus) / (looked_at - 1))
+    missing = max(0, looked_at - len(modes)) * USUAL_SURPLUS
+    return np.asarray((surplus.sum() - surplus + missing) / (looked_at - 1))

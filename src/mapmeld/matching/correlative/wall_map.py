@@ -30,6 +30,10 @@ BORDER = 2  # unknown cells around a field, where points outside the map land
 STRAIGHT_LEAST = 0.3  # of a line; below, a wall point has no direction
 FLOOR_SAMPLE = 1000  # known cells that measure the overlap
 
+_WINDOW = [(dx, dy) for dy in range(-2, 3) for dx in range(-2, 3)]
+_INNER = [at for at in _WINDOW if max(map(abs, at)) < 2]  # 3 x 3 field cells around one
+_OUTER = [at for at in _WINDOW if max(map(abs, at)) == 2]  # the further ones of 5 x 5
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WallMap:
@@ -177,24 +181,18 @@ def _wall_points(wall: Image, k: int, shape: tuple[int, int]) -> _WallPoints:
     for column, weight in enumerate((None, x, y, x * x, x * y, y * y)):
         m[:, column] = np.bincount(i, weight, n + 1)
     m[:n, 6], m[n, 6] = 1, 0  # counts field cells
-    near = _sums(m, place, own, width, _rings(0, 1))
+    near = _sums(m, place, own, width, _INNER)
     along, straight, middle, length = _lines(near)
     line = np.where(straight > STRAIGHT_LEAST, along * 1j, 0)
     blob = np.flatnonzero(straight <= STRAIGHT_LEAST)
     if len(blob):
-        wide = near[blob] + _sums(m, place, own[blob], width, _rings(2))
+        wide = near[blob] + _sums(m, place, own[blob], width, _OUTER)
         along_wide, straight_wide, _, length[blob] = _lines(wide)
         line[blob] = np.where(straight_wide > STRAIGHT_LEAST, along_wide * 1j, 0)
     mine = (m[:n, 1] + 1j * m[:n, 2]) / m[:n, 0]
     on_line = middle + along * ((mine - middle) * along.conj()).real
     spot = np.where(straight > STRAIGHT_LEAST, on_line, mine) / (2 * k) - (1 + 1j) * BORDER
     return _WallPoints(own, np.asarray(spot), along * 1j, straight, line, length / (2 * k))
-
-
-def _rings(*rings: int) -> list[tuple[int, int]]:
-    """Return the field cells of square rings around one: 0 is itself, 1 the 8 around it, 2 the next 16."""
-    reach = range(-max(rings), max(rings) + 1)
-    return [(dx, dy) for dy in reach for dx in reach if max(abs(dx), abs(dy)) in rings]
 
 
 def _sums(m: Doubles, place: Cells, own: Index, width: int, around: list[tuple[int, int]]) -> Doubles:
