@@ -11,9 +11,9 @@ from tiny_dataset import elsewhere, row, wrong
 
 from mapmeld.errors import MapmeldError
 from mapmeld.evaluation import TrialRow
-from mapmeld.evaluation.rows import COLUMN_KINDS
 from mapmeld.evaluation.store import StoreError, add_rows, clear_rows, gather_rows, read_rows
 from mapmeld.extras import MissingExtraError
+from mapmeld.parquet_rows import COLUMN_KINDS
 
 KINDS = {
     "str": st.text(st.characters(exclude_categories=["Cs"])),

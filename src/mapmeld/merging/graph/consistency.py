@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from mapmeld.merging.graph.edges import (
     seen_from,
     squared_distance,
 )
-from mapmeld.merging.graph.least_squares import Fit, errors, fit, parts
+from mapmeld.merging.graph.least_squares import Fit, errors, fit
 from mapmeld.merging.graph.robust import Robust, graduated
 
 FITS = 16.27
@@ -76,9 +76,9 @@ def consistent(
 ) -> Consistent:
     """Sort out which edges contradict one another.
 
-    Starts from a spanning tree of the edges that most triangles confirm (after Zach, Klopschitz and Pollefeys,
-    "Disambiguating Visual Relations Using Loop Constraints", 2010), lets go of what does not fit by graduated
-    non-convexity, tests every edge against all others, and then exchanges groups of edges across
+    Starts from a spanning tree of the edges that most triangles confirm (after Zach, Klopschitz and
+    Pollefeys, "Disambiguating Visual Relations Using Loop Constraints", 2010), lets go of what does not fit
+    by graduated non-convexity, tests every edge against all others, and then exchanges groups of edges across
     minimum cuts for as long as that explains more.
 
     Parameters
@@ -108,7 +108,7 @@ def consistent(
 
 # ---------------------------------------------------------------------- the start
 def confirmation(edges: Edges) -> Doubles:
-    """Return for each edge (m,) the weight of the triangles that close with it less that of those that do not.
+    """Return per edge (m,) the weight of the triangles that close with it less that of those that do not.
 
     A triangle weighs as much as the weaker of its two other edges. An edge counts for itself, too.
     """
@@ -130,7 +130,9 @@ def confirmation(edges: Edges) -> Doubles:
         one = np.array([out[a][c] for c in through])
         two = np.array([out[c][b] for c in through])
         way = composed(z[one], z[two])
-        error = errors(composed(way, np.repeat(inverted(edges.z[[k]]), len(one), axis=0)), np.zeros((len(one), 3)))
+        error = errors(
+            composed(way, np.repeat(inverted(edges.z[[k]]), len(one), axis=0)), np.zeros((len(one), 3))
+        )
         sigma = spread[one] + seen_from(z[one], spread[two]) + spread[k]
         closes = squared_distance(error, sigma) <= FITS
         weight = np.minimum(edges.weight[one % m], edges.weight[two % m])
@@ -174,7 +176,7 @@ class _Found:
 
 
 def _tested(start: Doubles, edges: Edges, used: Flags, barred: Flags, world: int | None) -> _Found:
-    """Take out what the others contradict and put in what they do not, one edge at a time, the worst first."""
+    """Take out what the others contradict, put in what they do not, one edge at a time, the worst first."""
     used = used.copy()
     turns = np.zeros(len(edges), np.intp)
     while True:
@@ -199,15 +201,13 @@ def _tested(start: Doubles, edges: Edges, used: Flags, barred: Flags, world: int
 def _following(poses: Doubles, edges: Edges, used: Flags) -> Doubles:
     """Return the poses with parts that an edge joins anew laid where it says."""
     kept = edges[used]
-    off = squared_distance(
-        errors(composed(inverted(poses[kept.i]), poses[kept.j]), kept.z), kept.covariance
-    )
+    off = squared_distance(errors(composed(inverted(poses[kept.i]), poses[kept.j]), kept.z), kept.covariance)
     return spanning_poses(len(poses), kept, -off)[0] if (off > 100 * FITS).any() else poses
 
 
 # ---------------------------------------------------------------------- other explanations
 def _best(found: _Found, edges: Edges, world: int | None) -> _Found:
-    """Exchange edges that hold two sides together for such as contradict them, as long as it explains more."""
+    """Exchange edges that hold two sides together for such as contradict them while that explains more."""
     while True:
         for k, weight in _against(found, edges):
             value, side = _cut(found, edges, [int(edges.i[k])], [int(edges.j[k])])
@@ -250,7 +250,7 @@ def _undecided(found: _Found, edges: Edges) -> Flags:
 
 
 def _against(found: _Found, edges: Edges) -> list[tuple[int, float]]:
-    """Return every edge that contradicts the poses of its two nodes, with the weight of all that say the same.
+    """Return every edge that contradicts the poses of its nodes, with the weight of all that say the same.
 
     Two say the same if the motion that would bring the ends of one together brings those of the other
     together, too. The weightiest come first.

@@ -36,8 +36,8 @@ def min_cut(
     tied = np.full(len(sources) + len(sinks), _TIED)
     rows = np.concatenate([i, j, np.full(len(sources), s), sinks])
     cols = np.concatenate([j, i, sources, np.full(len(sinks), t)])
-    capacity = sparse.coo_array((np.concatenate([units, units, tied]), (rows, cols)), (count + 2, count + 2))
-    capacity = capacity.tocsr()
+    shape = count + 2, count + 2
+    capacity = sparse.csr_array((np.concatenate([units, units, tied]), (rows, cols)), shape)
     capacity.data = np.minimum(capacity.data, _TIED).astype(np.int32)
     found = maximum_flow(capacity, s, t)
     left = (capacity - found.flow).tocsr()

@@ -133,9 +133,7 @@ class Edges:
 
     def __getitem__(self, which: Flags | Index) -> Edges:
         """Return some of them, by a mask or by their numbers."""
-        return Edges(
-            self.i[which], self.j[which], self.z[which], self.covariance[which], self.weight[which]
-        )
+        return Edges(self.i[which], self.j[which], self.z[which], self.covariance[which], self.weight[which])
 
     @property
     def given(self) -> Flags:
@@ -155,8 +153,9 @@ def pose_of(row: ArrayLike) -> Pose2:
 
 
 def wrapped(angles: Doubles) -> Doubles:
-    """Return the same directions in [-pi, pi)."""
-    return np.asarray((angles + math.pi) % math.tau - math.pi)
+    """Return the same directions in [-pi, pi]; those that are there already are not touched."""
+    turned = (angles + math.pi) % math.tau - math.pi
+    return np.where(np.abs(angles) <= math.pi, angles, turned)
 
 
 def composed(one: Doubles, two: Doubles) -> Doubles:
@@ -175,7 +174,10 @@ def inverted(T: Doubles) -> Doubles:
 
 
 def moves(T: Doubles, covariance: Doubles) -> Doubles:
-    """Return the covariance (m, 3, 3) of the motion (shift, turn about the origin of frame a) by which T_a_b errs."""
+    """Return the covariance (m, 3, 3) of the motion by which T_a_b (m, 3) errs.
+
+    A shift and a turn about the origin of frame a.
+    """
     B = _eye(len(T))
     B[:, 0, 2], B[:, 1, 2] = T[:, 1], -T[:, 0]
     return B @ covariance @ B.transpose(0, 2, 1)
@@ -188,6 +190,17 @@ def seen_from(X: Doubles, covariance: Doubles) -> Doubles:
     A[:, 0, 0], A[:, 0, 1], A[:, 1, 0], A[:, 1, 1] = c, -s, s, c
     A[:, 0, 2], A[:, 1, 2] = X[:, 1], -X[:, 0]
     return A @ covariance @ A.transpose(0, 2, 1)
+
+
+def in_own_frames(edges: Edges) -> Doubles:
+    """Return the covariances (m, 3, 3) of the errors as they are seen in the frames of the nodes j, not i.
+
+    That is how g2o and GTSAM measure them.
+    """
+    c, s = np.cos(edges.z[:, 2]), np.sin(edges.z[:, 2])
+    A = np.zeros((len(edges), 3, 3))
+    A[:, 0, 0], A[:, 0, 1], A[:, 1, 0], A[:, 1, 1], A[:, 2, 2] = c, s, -s, c, 1.0
+    return np.asarray(A @ edges.covariance @ A.transpose(0, 2, 1))
 
 
 def squared_distance(residuals: Doubles, covariance: Doubles) -> Doubles:

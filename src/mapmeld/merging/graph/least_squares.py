@@ -48,7 +48,7 @@ class Fit:
         return T, J @ self._joint(i, j) @ J.transpose(0, 2, 1)
 
     def strain(self, edges: Edges, used: Flags) -> Doubles:
-        """Return how far each edge (m,) is from what the *other* edges say, as a squared Mahalanobis distance.
+        """Return how far each edge (m,) is from what the *other* edges say: squared Mahalanobis distances.
 
         For an edge that was used, the others are all but itself: the statistic of Baarda's data snooping
         ("A testing procedure for use in geodetic networks", 1968). 0 where the others say nothing.
@@ -109,18 +109,20 @@ def fit(start: Doubles, edges: Edges, world: int | None = None) -> Fit:
 
 
 def optimised(
-    start: Doubles, edges: Edges, frames: Index, weights: Doubles | None = None
+    start: Doubles, edges: Edges, frames: Index, weights: Doubles | None = None, steps: int = _STEPS
 ) -> Doubles:
     """Return the poses (n, 3) with the least weighted squared errors, those of `frames` kept as they are."""
     free = np.setdiff1d(np.arange(len(start)), frames)
     if not len(free) or not len(edges):
         return start
     w = np.ones(len(edges)) if weights is None else weights
-    whiten = np.linalg.cholesky(np.linalg.inv(edges.covariance)).transpose(0, 2, 1) * np.sqrt(w)[:, None, None]
+    whiten = (
+        np.linalg.cholesky(np.linalg.inv(edges.covariance)).transpose(0, 2, 1) * np.sqrt(w)[:, None, None]
+    )
     poses, damping = start, 0.0
     r, J = _whitened(poses, edges, whiten, free)
     cost = float(r @ r)
-    for _ in range(_STEPS):
+    for _ in range(steps):
         H = (J.T @ J).tocsc()
         # What no edge holds any more (all its weights are 0) stays where it is.
         diagonal = H.diagonal()
@@ -167,9 +169,7 @@ def _relative(poses: Doubles, i: Index, j: Index) -> tuple[Doubles, Doubles]:
     return np.stack([x, y, wrapped(two[:, 2] - one[:, 2])], axis=1), J
 
 
-def _whitened(
-    poses: Doubles, edges: Edges, whiten: Doubles, free: Index
-) -> tuple[Doubles, sparse.csr_array]:
+def _whitened(poses: Doubles, edges: Edges, whiten: Doubles, free: Index) -> tuple[Doubles, sparse.csr_array]:
     """Return the errors (3 m,) in units of their deviations and their sparse derivative by the free poses."""
     T, J = _relative(poses, edges.i, edges.j)
     r = (whiten @ errors(T, edges.z)[..., None])[..., 0]

@@ -7,7 +7,7 @@ out, ambiguous ones settled by what is left, and the poses fitted.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
@@ -71,6 +71,9 @@ class PairMatch:
         The state in words.
     T_i_j
         The transform that is used; None if none is.
+    covariance
+        (3, 3) of (x, y, theta) of T_i_j [m, m, rad] as the graph takes it: the match's own and what the
+        bending of the two maps adds.
     bridge
         Whether this used match alone holds two groups of maps together: no cycle checks it,
         it rests on its own probability.
@@ -85,6 +88,7 @@ class PairMatch:
     state: PairState = PairState.UNUSED
     why: str = ""
     T_i_j: Pose2 | None = None
+    covariance: Doubles | None = None
     bridge: bool = False
     off: tuple[float, float] | None = None
 
@@ -105,6 +109,8 @@ class MapGraph:
         Per map (3, 3) of (x, y, theta) of ``T_c_i``, bending of the maps included; zeros for the first.
     T_w_i
         Per map its pose in the frame in which poses were known; None where that is not connected.
+    known
+        The poses that were given, by the maps' indices.
     """
 
     pairs: tuple[PairMatch, ...]
@@ -112,6 +118,7 @@ class MapGraph:
     poses: tuple[Pose2, ...]
     covariances: tuple[Doubles, ...]
     T_w_i: tuple[Pose2 | None, ...]
+    known: Mapping[int, KnownPose]
 
 
 def solve(
@@ -153,7 +160,7 @@ def solve(
     if extra:
         pairs = [_with_mode(pair, row) for pair, row in zip(pairs, settled, strict=True)]
         final = fit(final.poses, _joined(edges[found.used], Edges.of(extra)), world)
-    return _graph([_off(pair, final, extents) for pair in pairs], final, world)
+    return _graph([_off(pair, final, extents) for pair in pairs], final, world, known or {})
 
 
 def _is_accepted(result: MatchResult) -> bool:
@@ -177,9 +184,10 @@ def _judged(pair: PairMatch, found: Consistent, e: int, edges: Edges) -> PairMat
         labels = parts(len(found.fit.poses), rest)
         bridge = bool(labels[pair.i] != labels[pair.j])
         why = f"in no cycle: rests on this match alone{sure}" if bridge else "agrees with the others"
-        return replace(pair, state=PairState.USED, why=why, T_i_j=pair.result.T_a_b, bridge=bridge)
+        T, covariance = pair.result.T_a_b, edges.covariance[e]
+        return replace(pair, state=PairState.USED, why=why, T_i_j=T, covariance=covariance, bridge=bridge)
     if found.absent[e]:
-        why = "pairs of maps that would then overlap by half or more did not match"
+        why = "maps that would then overlap did not match"
         return replace(pair, state=PairState.DOUBTED, why=why)
     if found.doubted[e]:
         why = "contradicted by matches that are about as probable together; none of them is used"
@@ -187,10 +195,8 @@ def _judged(pair: PairMatch, found: Consistent, e: int, edges: Edges) -> PairMat
     return replace(pair, state=PairState.FALSE, why="contradicted by the other matches")
 
 
-def _settled(
-    pair: PairMatch, found: Fit, extents: Sequence[Extent]
-) -> tuple[Pose2, Doubles, float] | None:
-    """Return the one mode of an ambiguous match that fits what the graph says anyway, as the row of an edge."""
+def _settled(pair: PairMatch, found: Fit, extents: Sequence[Extent]) -> tuple[Pose2, Doubles, float] | None:
+    """Return the one mode of an ambiguous match that fits what the graph says anyway, as an edge's row."""
     result = pair.result
     if result.verdict is not Verdict.AMBIGUOUS or found.labels[pair.i] != found.labels[pair.j]:
         return None
@@ -216,9 +222,7 @@ def _of_mode(pair: PairMatch, T: Pose2, extents: Sequence[Extent]) -> Doubles:
 
 
 def _modes(result: MatchResult) -> list[Alternative]:
-    best = [] if result.T_a_b is None else [
-        Alternative(result.T_a_b, result.similarity, result.probability)
-    ]
+    best = [] if result.T_a_b is None else [Alternative(result.T_a_b, result.similarity, result.probability)]
     return [*best, *result.alternatives]
 
 
@@ -227,7 +231,8 @@ def _with_mode(pair: PairMatch, row: tuple[Pose2, Doubles, float] | None) -> Pai
         return pair
     number = [mode.T_a_b for mode in _modes(pair.result)].index(row[0])
     which = "its best mode" if number == 0 else f"its mode {number + 1}"
-    return replace(pair, state=PairState.SETTLED, why=f"only {which} fits the other matches", T_i_j=row[0])
+    why = f"ambiguous; only {which} fits the other matches"
+    return replace(pair, state=PairState.SETTLED, why=why, T_i_j=row[0], covariance=row[1])
 
 
 def _overlooked(
@@ -238,7 +243,7 @@ def _overlooked(
     j: Index,
     T_i_j: Doubles,
 ) -> Flags:
-    """Tell which pairs overlap much where they lie, though by their match they more likely do not lie there."""
+    """Tell which pairs overlap much where they lie, though by their match they hardly lie there."""
 
     def one(a: int, b: int, row: Doubles) -> bool:
         result = results.get((a, b))
@@ -258,7 +263,7 @@ def _overlooked(
 
 
 # ---------------------------------------------------------------------- the outcome
-def _graph(pairs: Sequence[PairMatch], final: Fit, world: int) -> MapGraph:
+def _graph(pairs: Sequence[PairMatch], final: Fit, world: int, known: Mapping[int, KnownPose]) -> MapGraph:
     labels = final.labels[:world]
     groups = [np.flatnonzero(labels == label) for label in dict.fromkeys(labels.tolist())]
     poses, covariances = np.zeros((world, 3)), np.zeros((world, 3, 3))
@@ -272,6 +277,7 @@ def _graph(pairs: Sequence[PairMatch], final: Fit, world: int) -> MapGraph:
         tuple(pose_of(row) for row in poses),
         tuple(covariances),
         tuple(pose_of(final.poses[i]) if inside else None for i, inside in enumerate(in_world)),
+        dict(known),
     )
 
 

@@ -18,11 +18,10 @@ Robust = Callable[[Doubles, Edges, float, int | None], tuple[Doubles, Flags]]
 
 _GROWTH = 1.4
 _ROUNDS = 100
+_STEPS = 4  # of least squares in each round; the next one goes on from there
 
 
-def graduated(
-    start: Doubles, edges: Edges, most: float, world: int | None = None
-) -> tuple[Doubles, Flags]:
+def graduated(start: Doubles, edges: Edges, most: float, world: int | None = None) -> tuple[Doubles, Flags]:
     """Return poses (n, 3) and which edges (m,) they rest on.
 
     Parameters
@@ -32,7 +31,7 @@ def graduated(
     edges
         Those that are given are always kept.
     most
-        Squared Malahanobis distance from which an edge counts as not fitting.
+        Squared Mahalanobis distance from which an edge counts as not fitting.
     world
         As in `mapmeld.merging.graph.least_squares.fit`.
     """
@@ -46,7 +45,7 @@ def graduated(
     for _ in range(_ROUNDS):
         w = np.sqrt(most * mu * (mu + 1)) / np.sqrt(np.maximum(d2, 1e-12)) - mu
         w = np.where(d2 <= mu / (mu + 1) * most, 1.0, np.where(d2 >= (mu + 1) / mu * most, 0.0, w))
-        poses = optimised(poses, edges, frames, w)
+        poses = optimised(poses, edges, frames, w, _STEPS)
         d2 = _unfit(poses, edges)
         if ((w == 0) | (w == 1)).all():
             break
