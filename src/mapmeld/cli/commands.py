@@ -20,6 +20,7 @@ from mapmeld.cli.benchmark import benchmark
 from mapmeld.cli.demo import demo
 from mapmeld.cli.errors import BAD_INPUT, CLOSED_PIPE, FAULT, INTERRUPTED, NO_MATCH, say
 from mapmeld.cli.explain import explain
+from mapmeld.cli.graph import graph
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.show import show
@@ -145,5 +146,5 @@ def _options(
     pass
 
 
-for _command in (match, merge, show, explain, demo, benchmark):
+for _command in (match, merge, graph, show, explain, demo, benchmark):
     app.command()(_command)

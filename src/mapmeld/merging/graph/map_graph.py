@@ -31,7 +31,7 @@ from mapmeld.merging.graph.edges import (
     squared_distance,
 )
 from mapmeld.merging.graph.known_poses import KnownPose
-from mapmeld.merging.graph.least_squares import Fit, errors, fit, parts
+from mapmeld.merging.graph.least_squares import Fit, errors, fit, parts, residuals
 from mapmeld.merging.graph.robust import Robust, graduated
 from mapmeld.se2 import Pose2
 
@@ -40,6 +40,10 @@ MUCH_OVERLAP = 0.3
 
 LIKELY = 0.05
 """Probability below which a mode of an ambiguous match does not count."""
+
+
+PRIOR_CYCLES = 1
+"""So many cycles that close as well as expected are imagined beside a component's own."""
 
 
 class PairState(StrEnum):
@@ -147,33 +151,37 @@ def solve(
     world = len(maps)
     given = [(world, i, pose.T_w_i, pose.covariance(), math.inf) for i, pose in sorted((known or {}).items())]
     accepted = [k for k, pair in enumerate(pairs) if _is_accepted(pair.result)]
-    rows = [(pairs[k].i, pairs[k].j, *_measured(pairs[k], extents)) for k in accepted]
-    edges = Edges.of([*given, *rows])
+    edges = Edges.of([*given, *(_edge(pairs[k], pairs[k].result.T_a_b, extents) for k in accepted)])
     overlooked = partial(_overlooked, maps, extents, {(pair.i, pair.j): pair.result for pair in pairs})
     found = consistent(world + 1, edges, world, overlooked, robust)
 
     for k, e in zip(accepted, range(len(given), len(edges)), strict=True):
         pairs[k] = _judged(pairs[k], found, e, edges)
-    settled = [_settled(pair, found.fit, extents) for pair in pairs]
-    extra = [(pair.i, pair.j, *row) for pair, row in zip(pairs, settled, strict=True) if row is not None]
-    final = found.fit
-    if extra:
-        pairs = [_with_mode(pair, row) for pair, row in zip(pairs, settled, strict=True)]
-        final = fit(final.poses, _joined(edges[found.used], Edges.of(extra)), world)
+    pairs = [_settled(pair, found.fit, extents) for pair in pairs]
+    pairs, final = _fitted(pairs, Edges.of(given), extents, found.fit.poses, world)
     return _graph([_off(pair, final, extents) for pair in pairs], final, world, known or {})
+
+
+def _edge(
+    pair: PairMatch, T_i_j: Pose2 | None, extents: Sequence[Extent]
+) -> tuple[int, int, Pose2, Doubles, float]:
+    assert T_i_j is not None
+    own, bend = _spread(pair, T_i_j, extents)
+    return pair.i, pair.j, T_i_j, own + bend, log_odds(pair.result.probability)
 
 
 def _is_accepted(result: MatchResult) -> bool:
     return result.verdict is Verdict.ACCEPTED and result.T_a_b is not None
 
 
-def _measured(pair: PairMatch, extents: Sequence[Extent]) -> tuple[Pose2, Doubles, float]:
-    T, result = pair.result.T_a_b, pair.result
-    assert T is not None
-    covariance = bending(T, extents[pair.i], extents[pair.j])
-    if result.covariance is not None:
-        covariance = covariance + result.covariance
-    return T, covariance, log_odds(result.probability)
+def _spread(pair: PairMatch, T_i_j: Pose2, extents: Sequence[Extent]) -> tuple[Doubles, Doubles]:
+    """Return the covariance of a mode of a match as the matcher has it, and what bending adds to it."""
+    result, own = pair.result, np.zeros((3, 3))
+    if result.covariance is not None and result.T_a_b is not None:
+        own = result.covariance
+        if T_i_j is not result.T_a_b:
+            own = of_another_mode(result.T_a_b, own, T_i_j, extents[pair.j])
+    return own, bending(T_i_j, extents[pair.i], extents[pair.j])
 
 
 # ---------------------------------------------------------------------- what becomes of a match
@@ -184,8 +192,7 @@ def _judged(pair: PairMatch, found: Consistent, e: int, edges: Edges) -> PairMat
         labels = parts(len(found.fit.poses), rest)
         bridge = bool(labels[pair.i] != labels[pair.j])
         why = f"in no cycle: rests on this match alone{sure}" if bridge else "agrees with the others"
-        T, covariance = pair.result.T_a_b, edges.covariance[e]
-        return replace(pair, state=PairState.USED, why=why, T_i_j=T, covariance=covariance, bridge=bridge)
+        return replace(pair, state=PairState.USED, why=why, T_i_j=pair.result.T_a_b, bridge=bridge)
     if found.absent[e]:
         why = "maps that would then overlap did not match"
         return replace(pair, state=PairState.DOUBTED, why=why)
@@ -195,44 +202,34 @@ def _judged(pair: PairMatch, found: Consistent, e: int, edges: Edges) -> PairMat
     return replace(pair, state=PairState.FALSE, why="contradicted by the other matches")
 
 
-def _settled(pair: PairMatch, found: Fit, extents: Sequence[Extent]) -> tuple[Pose2, Doubles, float] | None:
-    """Return the one mode of an ambiguous match that fits what the graph says anyway, as an edge's row."""
+def _settled(pair: PairMatch, found: Fit, extents: Sequence[Extent]) -> PairMatch:
+    """Settle an ambiguous match if exactly one of its modes fits what the graph says anyway."""
     result = pair.result
     if result.verdict is not Verdict.AMBIGUOUS or found.labels[pair.i] != found.labels[pair.j]:
-        return None
-    i, j = np.array([pair.i]), np.array([pair.j])
-    T, spread = found.relative(i, j)
-    fitting = []
-    for mode in _modes(result):
-        if mode.probability is not None and mode.probability < LIKELY:
-            continue
-        covariance = _of_mode(pair, mode.T_a_b, extents)
-        r = errors(T, np.array([row_of(mode.T_a_b)]))
-        if squared_distance(r, spread + covariance)[0] <= FITS:
-            fitting.append((mode.T_a_b, covariance, log_odds(mode.probability)))
-    return fitting[0] if len(fitting) == 1 else None
+        return pair
+    T, spread = found.relative(np.array([pair.i]), np.array([pair.j]))
+    fitting = [
+        (number, mode)
+        for number, mode in enumerate(_modes(result), start=1)
+        if (mode.probability is None or mode.probability >= LIKELY)
+        and _near(pair, mode.T_a_b, T, spread, extents)
+    ]
+    if len(fitting) != 1:
+        return pair
+    ((number, mode),) = fitting
+    why = f"ambiguous; only {'its best mode' if number == 1 else f'its mode {number}'} fits the other matches"
+    return replace(pair, state=PairState.SETTLED, why=why, T_i_j=mode.T_a_b)
 
 
-def _of_mode(pair: PairMatch, T: Pose2, extents: Sequence[Extent]) -> Doubles:
-    result, b = pair.result, extents[pair.j]
-    covariance = bending(T, extents[pair.i], b)
-    if result.covariance is not None and result.T_a_b is not None:
-        covariance = covariance + of_another_mode(result.T_a_b, result.covariance, T, b)
-    return covariance
+def _near(pair: PairMatch, mode: Pose2, T: Doubles, spread: Doubles, extents: Sequence[Extent]) -> bool:
+    """Whether a mode is where the graph says (1, 3), as exactly (1, 3, 3) as that and the mode are known."""
+    gap = errors(T, np.array([row_of(mode)]))
+    return bool(squared_distance(gap, spread + sum(_spread(pair, mode, extents)))[0] <= FITS)
 
 
 def _modes(result: MatchResult) -> list[Alternative]:
     best = [] if result.T_a_b is None else [Alternative(result.T_a_b, result.similarity, result.probability)]
     return [*best, *result.alternatives]
-
-
-def _with_mode(pair: PairMatch, row: tuple[Pose2, Doubles, float] | None) -> PairMatch:
-    if row is None:
-        return pair
-    number = [mode.T_a_b for mode in _modes(pair.result)].index(row[0])
-    which = "its best mode" if number == 0 else f"its mode {number + 1}"
-    why = f"ambiguous; only {which} fits the other matches"
-    return replace(pair, state=PairState.SETTLED, why=why, T_i_j=row[0], covariance=row[1])
 
 
 def _overlooked(
@@ -253,8 +250,7 @@ def _overlooked(
         least = LIKELY if result.verdict is Verdict.AMBIGUOUS else 0.5
         pair = PairMatch(a, b, result)
         for mode in _modes(result):
-            gap = errors(row[None], np.array([row_of(mode.T_a_b)]))
-            near = squared_distance(gap, _of_mode(pair, mode.T_a_b, extents)[None])[0] <= FITS
+            near = _near(pair, mode.T_a_b, row[None], np.zeros((1, 3, 3)), extents)
             if near and mode.probability is not None and mode.probability >= least:
                 return False
         return overlap_share(maps[a], maps[b], pose_of(row)) >= MUCH_OVERLAP
@@ -263,6 +259,36 @@ def _overlooked(
 
 
 # ---------------------------------------------------------------------- the outcome
+def _fitted(
+    pairs: Sequence[PairMatch], given: Edges, extents: Sequence[Extent], start: Doubles, world: int
+) -> tuple[list[PairMatch], Fit]:
+    """Fit the poses to all transforms that are used, with as much bending as these maps show.
+
+    How well the cycles of a component close scales what bending is assumed to add (the variance of unit
+    weight of least squares, a posteriori), from what it was taken to be for telling false matches.
+    """
+    used = [k for k, pair in enumerate(pairs) if pair.T_i_j is not None]
+    modes = [(pairs[k], pairs[k].T_i_j) for k in used]
+    edges = Edges.of([_edge(pair, T, extents) for pair, T in modes])
+    bend = np.array([_spread(pair, T, extents)[1] for pair, T in modes if T]).reshape(-1, 3, 3)
+    first = fit(start, _joined(given, edges), world)
+    labels = first.labels[edges.i]
+    strain = squared_distance(residuals(first.poses, edges), edges.covariance)
+    count = len(first.frames)
+    cycles = (
+        np.bincount(first.labels[np.concatenate([given.i, edges.i])], minlength=count)
+        - np.bincount(first.labels, minlength=count)
+        + 1
+    )
+    sums = np.bincount(labels, strain, count)
+    scale = (PRIOR_CYCLES * 3 + sums) / (PRIOR_CYCLES * 3 + 3 * cycles)
+    edges = replace(edges, covariance=edges.covariance + (scale[labels] - 1)[:, None, None] * bend)
+    pairs = list(pairs)
+    for k, covariance in zip(used, edges.covariance, strict=True):
+        pairs[k] = replace(pairs[k], covariance=covariance)
+    return pairs, fit(first.poses, _joined(given, edges), world)
+
+
 def _graph(pairs: Sequence[PairMatch], final: Fit, world: int, known: Mapping[int, KnownPose]) -> MapGraph:
     labels = final.labels[:world]
     groups = [np.flatnonzero(labels == label) for label in dict.fromkeys(labels.tolist())]

@@ -1,6 +1,6 @@
-import importlib
 import math
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +13,14 @@ from mapmeld.grid import OccupancyGrid
 from mapmeld.io import MapFileError
 from mapmeld.matching import MatchResult, Verdict
 from mapmeld.matching.alphabet import AlphabetParameters
-from mapmeld.merging import Joint, MergeError, UnknownFusionError, merge, merge_aligned
+from mapmeld.merging import Joint, MergeError, UnknownFusionError, merge_aligned
+from mapmeld.merging import merge as merge_maps
 from mapmeld.se2 import Pose2
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "maps"
 QUARTER = math.pi / 2
+
+merge = partial(merge_maps, strategy="sequential")
 
 
 # ------------------------------------------------------------------ a matcher that says what a test wants
@@ -57,8 +60,7 @@ class Matcher:
 
 
 def use(monkeypatch: pytest.MonkeyPatch, matcher: object) -> None:
-    # By the module's name in full: the package has a function of the same name.
-    monkeypatch.setattr(importlib.import_module("mapmeld.merging.merge"), "match", matcher)
+    monkeypatch.setattr("mapmeld.merging.sequential.match", matcher)
 
 
 # ------------------------------------------------------------------ who is matched with whom
