@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -58,8 +59,6 @@ class Cluster:
         return self.start("worker", self.address, *options)
 
     def address_in(self, file: Path) -> str:
-        import json
-
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:
             try:
@@ -71,7 +70,7 @@ class Cluster:
     def wait_for(self, count: int) -> None:
         from distributed import Client
 
-        with Client(self.address, set_as_default=False) as client:
+        with Client(self.address, set_as_default=False) as client:  # type: ignore[no-untyped-call]
             client.wait_for_workers(count, timeout=PATIENCE)
 
     def end(self) -> None:

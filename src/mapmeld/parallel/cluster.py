@@ -33,8 +33,6 @@ def run_on_cluster(
     They must have mapmeld installed, in the same version.
     """
     distributed = required("distributed", "dask")
-    # Both mean that a worker took with it what only it had; the jobs themselves are as good as before.
-    lost = (CancelledError, distributed.scheduler.KilledWorker)
     client = _client(distributed, address)
     waiting, run = dict(enumerate(jobs)), secrets.token_hex(8)
     try:
@@ -56,8 +54,10 @@ def run_on_cluster(
                 for future in as_completed(futures):
                     try:
                         result = future.result()
-                    except lost:
-                        continue
+                    except CancelledError:
+                        continue  # a worker took with it what only it had been sent
+                    except distributed.scheduler.KilledWorker as error:  # several times, on this job
+                        raise _died(address) from error
                     del waiting[futures[future]]
                     yield futures[future], result
             finally:
@@ -70,7 +70,11 @@ def run_on_cluster(
     finally:
         with contextlib.suppress(OSError, TimeoutError):
             client.close(timeout=5)
-    raise WorkerDiedError(
+    raise _died(address)
+
+
+def _died(address: str) -> WorkerDiedError:
+    return WorkerDiedError(
         f"{address}: workers died again and again (out of memory, or a crash in a library); "
         "run the same again to continue"
     )

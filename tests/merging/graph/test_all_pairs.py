@@ -58,7 +58,7 @@ def test_method_and_settings_reach_the_matcher(counting: Counting) -> None:
 
 def test_the_answers_are_those_of_match() -> None:
     ((_, _, found),) = match_all_pairs(MAPS[:2])
-    assert found.T_a_b == match(*MAPS[:2]).T_a_b
+    assert found.T_a_b == match(MAPS[0], MAPS[1]).T_a_b
 
 
 def test_workers_change_nothing_but_seconds() -> None:
