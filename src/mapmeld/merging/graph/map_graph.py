@@ -42,6 +42,9 @@ LIKELY = 0.05
 """Probability below which a mode of an ambiguous match does not count."""
 
 
+LEAST_OVERLAP = 0.1
+"""Overlap below which a match is not taken to be less exact still."""
+
 PRIOR_CYCLES = 1
 """So many cycles that close as well as expected are imagined beside a component's own."""
 
@@ -265,24 +268,24 @@ def _fitted(
     """Fit the poses to all transforms that are used, with as much bending as these maps show.
 
     How well the cycles of a component close scales what bending is assumed to add (the variance of unit
-    weight of least squares, a posteriori), from what it was taken to be for telling false matches.
+    weight of least squares, a posteriori) from what it was taken to be for telling false matches.
     """
     used = [k for k, pair in enumerate(pairs) if pair.T_i_j is not None]
     modes = [(pairs[k], pairs[k].T_i_j) for k in used]
-    edges = Edges.of([_edge(pair, T, extents) for pair, T in modes])
-    bend = np.array([_spread(pair, T, extents)[1] for pair, T in modes if T]).reshape(-1, 3, 3)
+    own, bend = np.zeros((2, len(used), 3, 3))
+    for n, (pair, T) in enumerate(modes):
+        if T is not None:
+            own[n], bend[n] = _spread(pair, T, extents)
+            # From a small part of two bent maps it is a long way to the whole of them.
+            bend[n] /= max(pair.result.overlap, LEAST_OVERLAP) ** 2
+    edges = replace(Edges.of([_edge(pair, T, extents) for pair, T in modes]), covariance=own + bend)
     first = fit(start, _joined(given, edges), world)
-    labels = first.labels[edges.i]
+    labels, count = first.labels[edges.i], len(first.frames)
     strain = squared_distance(residuals(first.poses, edges), edges.covariance)
-    count = len(first.frames)
-    cycles = (
-        np.bincount(first.labels[np.concatenate([given.i, edges.i])], minlength=count)
-        - np.bincount(first.labels, minlength=count)
-        + 1
-    )
-    sums = np.bincount(labels, strain, count)
-    scale = (PRIOR_CYCLES * 3 + sums) / (PRIOR_CYCLES * 3 + 3 * cycles)
-    edges = replace(edges, covariance=edges.covariance + (scale[labels] - 1)[:, None, None] * bend)
+    ends = np.concatenate([given.i, edges.i])
+    cycles = np.bincount(first.labels[ends], minlength=count) - np.bincount(first.labels, minlength=count) + 1
+    scale = (PRIOR_CYCLES + np.bincount(labels, strain, count) / 3) / (PRIOR_CYCLES + cycles)
+    edges = replace(edges, covariance=own + scale[labels][:, None, None] * bend)
     pairs = list(pairs)
     for k, covariance in zip(used, edges.covariance, strict=True):
         pairs[k] = replace(pairs[k], covariance=covariance)
