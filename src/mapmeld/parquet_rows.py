@@ -63,6 +63,18 @@ class RowStore(Generic[R]):
     kind: type[R]
     extra: str
 
+    def open(self, folder: Path) -> list[R]:
+        """Find out, before any work, that rows could not be kept in a folder, and read those that are in it.
+
+        Raises
+        ------
+        StoreError, MissingExtraError
+            As `read` and `add`.
+        """
+        required("pyarrow.parquet", self.extra)
+        _make(folder)
+        return self.read(folder)
+
     def read(self, folder: Path) -> list[R]:
         """Read all rows in the order in which they were added; of two with the same key, the later one.
 
@@ -97,10 +109,7 @@ class RowStore(Generic[R]):
         parquet = required("pyarrow.parquet", self.extra)
         content = io.BytesIO()
         parquet.write_table(self._table(rows), content, write_page_checksum=True)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise StoreError(f"{folder}: cannot be made: {error.strerror}") from error
+        _make(folder)
         number = max((_number(part) for part in _parts(folder)), default=0) + 1
         write_files([(folder / f"rows-{number:06d}-{secrets.token_hex(3)}.parquet", [content.getbuffer()])])
 
@@ -143,7 +152,7 @@ class RowStore(Generic[R]):
         if not table.schema.equals(self._schema()):
             raise StoreError(
                 f"{part}: has other columns than this version of mapmeld writes; "
-                f"use another folder, or --force to start afresh"
+                "use another folder, or remove this file, and what was in it is run again"
             )
         lists = [field.name for field in self._schema() if pyarrow.types.is_list(field.type)]
         return [self._row(values, lists) for values in table.to_pylist()]
@@ -175,6 +184,13 @@ class RowStore(Generic[R]):
                 for f in fields(self.kind)  # type: ignore[arg-type]
             ]
         )
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"{folder}: cannot be made: {error.strerror}") from error
 
 
 def _parts(folder: Path) -> list[Path]:

@@ -1,4 +1,5 @@
 import math
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from drawing import office, seen_from
 
+from mapmeld.extras import MissingExtraError
 from mapmeld.grid import OccupancyGrid
 from mapmeld.matching import Alternative, MatchResult, Verdict, match
 from mapmeld.matching.alphabet import AlphabetParameters
@@ -124,6 +126,18 @@ def test_a_damaged_store_is_named(tmp_path: Path, counting: Counting) -> None:
     part.write_bytes(b"nothing of the kind")
     with pytest.raises(StoreError, match=part.name):
         match_all_pairs(MAPS, store=tmp_path)
+
+
+def test_a_store_that_cannot_be_is_found_out_before_the_work(
+    tmp_path: Path, counting: Counting, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(StoreError, match="file: cannot be made"):
+        match_all_pairs(MAPS, store=tmp_path / "file")
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    with pytest.raises(MissingExtraError, match=r'pip install "mapmeld\[store\]"'):
+        match_all_pairs(MAPS, store=tmp_path / "s")
+    assert counting.calls == []
 
 
 @pytest.mark.parametrize(

@@ -164,7 +164,7 @@ def match_all_pairs(
     keys: Mapping[tuple[int, int], PairKey] = {}
     if store is not None:
         keys = _keys(maps, pairs, method, settings)
-        kept = {row.key: row for row in PAIR_STORE.read(store)}
+        kept = {row.key: row for row in PAIR_STORE.open(store)}
         done = {pair: kept[key].result() for pair, key in keys.items() if key in kept}
         for _ in done:
             if on_pair:
