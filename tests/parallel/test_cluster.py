@@ -10,17 +10,23 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import job_functions as functions
 import numpy as np
+import pyarrow.parquet  # type: ignore[import-untyped]
 import pytest
+from drawing import office, seen_from
 
 pytest.importorskip("distributed")
 
+from mapmeld.fingerprint import grid_digest
+from mapmeld.merging.graph import match_all_pairs
 from mapmeld.parallel import Shared, WorkerDiedError, run_jobs
 from mapmeld.parallel.cluster import ClusterError
+from mapmeld.se2 import Pose2
 
 PATIENCE = 60
 
@@ -144,6 +150,34 @@ def test_a_killed_worker_loses_no_result(cluster: Cluster, tmp_path: Path) -> No
     assert started[victim.pid] < 60
 
 
+def test_maps_are_matched_and_stored_once_each_though_a_worker_is_killed(
+    cluster: Cluster, tmp_path: Path
+) -> None:
+    victim, _ = cluster.worker(), cluster.worker()
+    cluster.wait_for(2)
+    grid = office(0.2)
+    maps = [seen_from(grid, Pose2(n, -n, n / 2)) for n in range(9)]
+    done: list[int] = []
+
+    def kill_in_the_middle() -> None:
+        done.append(1)
+        if len(done) == 6:
+            victim.send_signal(signal.SIGKILL)
+            victim.wait()
+
+    store = tmp_path / "pairs"
+    found = match_all_pairs(maps, cluster=cluster.address, store=store, on_pair=kill_in_the_middle)
+    assert [(i, j) for i, j, _ in found] == list(combinations(range(9), 2))
+    assert len(done) == len(found)
+    stored = pyarrow.parquet.read_table(store)
+    assert stored.num_rows == len(found)
+    digests = [grid_digest(grid).hex() for grid in maps]
+    pairs = set(zip(stored["map_a"].to_pylist(), stored["map_b"].to_pylist(), strict=True))
+    assert pairs == set(combinations(digests, 2))
+    for (_, _, there), (_, _, here) in zip(found[:3], match_all_pairs(maps[:4])[:3], strict=True):
+        assert there.T_a_b == here.T_a_b
+
+
 def test_the_only_worker_that_had_the_maps_is_killed_and_another_comes(
     cluster: Cluster, tmp_path: Path
 ) -> None:
@@ -170,6 +204,19 @@ def test_a_job_that_kills_every_worker_is_an_end(cluster: Cluster) -> None:
     cluster.wait_for(1)
     with pytest.raises(WorkerDiedError, match="again and again"):
         results(cluster, functions.dies, [(1,)])
+
+
+def test_a_scheduler_that_goes_away_is_named(cluster: Cluster, tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    log.mkdir()
+    cluster.worker()
+    cluster.wait_for(1)
+    jobs = [(Shared(0), number, str(log)) for number in range(30)]
+    running = run_jobs(functions.slow, jobs, cluster=cluster.address, shared=[np.array([1000])])
+    next(running)
+    cluster.processes[0].kill()
+    with pytest.raises(ClusterError, match="the Dask scheduler went away"):
+        list(running)
 
 
 def test_no_scheduler_and_no_workers_are_one_line(cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import secrets
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import CancelledError, Future, as_completed
 from typing import Any, TypeVar
 
@@ -33,9 +34,8 @@ def run_on_cluster(
     They must have mapmeld installed, in the same version.
     """
     distributed = required("distributed", "dask")
-    client = _client(distributed, address)
     waiting, run = dict(enumerate(jobs)), secrets.token_hex(8)
-    try:
+    with _connected(distributed, address) as client:
         for _ in range(RESTARTS + 1):
             # On every worker at once, so that one that dies is not the only one to have it.
             sent = _sent(client, shared, address)
@@ -67,9 +67,6 @@ def run_on_cluster(
                 return
             if client.status != "running":
                 raise ClusterError(f"{address}: the Dask scheduler went away")
-    finally:
-        with contextlib.suppress(OSError, TimeoutError):
-            client.close(timeout=5)
     raise _died(address)
 
 
@@ -78,6 +75,23 @@ def _died(address: str) -> WorkerDiedError:
         f"{address}: workers died again and again (out of memory, or a crash in a library); "
         "run the same again to continue"
     )
+
+
+@contextlib.contextmanager
+def _connected(distributed: Any, address: str) -> Iterator[Any]:
+    """Give a client; what it would log of a lost connection is said in our own words."""
+    log = logging.getLogger("distributed.client")
+    before = log.level
+    log.setLevel(logging.CRITICAL)
+    try:
+        client = _client(distributed, address)
+        try:
+            yield client
+        finally:
+            with contextlib.suppress(OSError, TimeoutError):
+                client.close(timeout=5)
+    finally:
+        log.setLevel(before)
 
 
 def _client(distributed: Any, address: str) -> Any:
