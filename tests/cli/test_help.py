@@ -15,6 +15,7 @@ from mapmeld.merging import FUSIONS
 COMMANDS = (
     "match",
     "merge",
+    "graph",
     "follow",
     "diff",
     "rebase",

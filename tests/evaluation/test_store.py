@@ -11,9 +11,9 @@ from tiny_dataset import elsewhere, row, wrong
 
 from mapmeld.errors import MapmeldError
 from mapmeld.evaluation import TrialRow
-from mapmeld.evaluation.rows import COLUMN_KINDS
 from mapmeld.evaluation.store import StoreError, add_rows, clear_rows, gather_rows, read_rows
 from mapmeld.extras import MissingExtraError
+from mapmeld.parquet_rows import COLUMN_KINDS
 
 KINDS = {
     "str": st.text(st.characters(exclude_categories=["Cs"])),
@@ -134,7 +134,7 @@ def test_other_columns_are_refused(tmp_path: Path) -> None:
     part = tmp_path / parts(tmp_path)[0]
     table = pyarrow.parquet.read_table(part).drop_columns(["seconds"])
     pyarrow.parquet.write_table(table, part)
-    with pytest.raises(StoreError, match=r"other columns.*--force"):
+    with pytest.raises(StoreError, match=r"other columns.*remove this file"):
         read_rows(tmp_path)
 
 

@@ -182,7 +182,7 @@ def test_a_worker_that_dies_is_named_and_what_was_done_is_kept(
         for process in multiprocessing.active_children():
             process.kill()
 
-    with pytest.raises(WorkerDiedError, match=r"a worker process died.*continue"):
+    with pytest.raises(WorkerDiedError, match=r"worker processes died.*continue"):
         run_trials(plan(folder, "alphabet", turn=300), keep=kept.extend, on_row=kill_the_workers)
     assert kept
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mapmeld.cli.errors import INTERRUPTED, say
+from mapmeld.cli.options import Cluster
+from mapmeld.cli.progress import counting
 from mapmeld.errors import MapmeldError
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ def benchmark(
         str, typer.Option(metavar="A,B", help="Methods to run, with commas between them.")
     ] = "all",
     workers: Annotated[int, typer.Option(metavar="N", min=1, help="Processes, of one thread each.")] = 1,
+    cluster: Cluster = None,
     turn: Annotated[
         int,
         typer.Option(metavar="N", min=0, help="Try each pair N times, map 2 turned by another angle each."),
@@ -78,7 +80,7 @@ def benchmark(
     tolerances = _tolerances(tolerance or (), sets)
     if out is not None:
         _check_out(out, force)
-    with _progress("Reading maps", sum(min(limit or len(s.pairs), len(s.pairs)) for s in sets)) as step:
+    with counting("Reading maps", sum(min(limit or len(s.pairs), len(s.pairs)) for s in sets)) as step:
         trials = plan_trials(
             sets,
             names,
@@ -112,8 +114,15 @@ def benchmark(
         aside = f" ({len(finished) - done} rows of other settings or other code)" * (done < len(finished))
         say(f"{out}: {done} of {len(trials)} trials are done already{aside}")
     try:
-        with _progress("Matching", len(trials) - done) as step:
-            rows = run_trials(trials, workers=workers, finished=finished, keep=keep, on_row=lambda _: step())
+        with counting("Matching", len(trials) - done) as step:
+            rows = run_trials(
+                trials,
+                workers=workers,
+                cluster=cluster,
+                finished=finished,
+                keep=keep,
+                on_row=lambda _: step(),
+            )
     except KeyboardInterrupt:
         kept = (
             "" if out is None else f"; what was done is in {out / ROWS}, the same command goes on from there"
@@ -215,16 +224,3 @@ def _print(lines: Sequence[Summary]) -> None:
     with out.capture() as captured:
         out.print(rich_table(lines, out.width if terminal else None))
     typer.echo("\n".join(line.rstrip() for line in captured.get().splitlines()))
-
-
-@contextmanager
-def _progress(what: str, total: int) -> Iterator[Callable[[], None]]:
-    """Show a bar on stderr while the block runs and calls what it is given; on a terminal only."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task(what, total=total)
-        yield lambda: progress.advance(task)

@@ -23,6 +23,7 @@ from mapmeld.cli.diff import diff
 from mapmeld.cli.errors import BAD_INPUT, CLOSED_PIPE, FAULT, INTERRUPTED, NO_MATCH, say
 from mapmeld.cli.explain import explain
 from mapmeld.cli.follow import follow
+from mapmeld.cli.graph import graph
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.rebase import rebase
@@ -151,7 +152,7 @@ def _options(
 
 
 for _command in (
-    match, merge, follow, diff, rebase, transform_points, show, explain, demo, benchmark,
+    match, merge, graph, follow, diff, rebase, transform_points, show, explain, demo, benchmark,
 ):  # fmt: skip
     app.command()(_command)
 app.add_typer(bag)

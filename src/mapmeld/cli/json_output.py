@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from mapmeld.history import Step
     from mapmeld.io.recordings import RecordingInfo
     from mapmeld.matching import MatchResult
-    from mapmeld.merging import MergeResult
+    from mapmeld.merging import MergeResult, PairMatch
+    from mapmeld.merging.graph import MapGraph
     from mapmeld.se2 import Pose2
 
 MATCH_SCHEMA = "mapmeld.match/1"
@@ -34,6 +35,7 @@ TRANSFORM_POINTS_SCHEMA = "mapmeld.transform-points/1"
 
 STEP_SCHEMA = "mapmeld.follow.step/1"
 FOLLOW_SCHEMA = "mapmeld.follow/1"
+GRAPH_SCHEMA = "mapmeld.graph/1"
 
 Fields = dict[str, Any]
 
@@ -93,8 +95,15 @@ def merge_fields(
         "fusion": fusion,
         "complete": result.complete,
         "maps": [
-            {"path": path, "T_1_i": pose_fields(pose), "start": pose_fields(start)}
-            for path, pose, start in zip(paths, result.poses, result.starts, strict=True)
+            {
+                "path": path,
+                "T_1_i": pose_fields(pose),
+                "covariance": None if covariance is None else covariance.tolist(),
+                "start": pose_fields(start),
+            }
+            for path, pose, covariance, start in zip(
+                paths, result.poses, result.covariances, result.starts, strict=True
+            )
         ],
         "components": [list(component) for component in result.components],
         "joints": [
@@ -104,7 +113,36 @@ def merge_fields(
         "refused": [
             {"index": index, **_evidence(refused)} for index, refused in sorted(result.refused.items())
         ],
+        "pairs": [_pair_fields(pair) for pair in result.pairs],
         "files": [str(file) for file in files],
+        "seconds": seconds,
+    }
+
+
+def graph_fields(
+    graph: MapGraph, method: str, parameters: Any, paths: Sequence[str], seconds: float
+) -> Fields:
+    """Return the fields of schema mapmeld.graph/1."""
+    component = {i: number for number, members in enumerate(graph.components) for i in members}
+    return {
+        "schema": GRAPH_SCHEMA,
+        "mapmeld": __version__,
+        "method": method,
+        "parameters": asdict(parameters),
+        "complete": len(graph.components) == 1,
+        "components": [list(members) for members in graph.components],
+        "maps": [
+            {
+                "path": path,
+                "component": component[i],
+                "T_c_i": pose_fields(graph.poses[i]),
+                "covariance": graph.covariances[i].tolist(),
+                "T_w_i": pose_fields(graph.T_w_i[i]),
+                "known": i in graph.known,
+            }
+            for i, path in enumerate(paths)
+        ],
+        "pairs": [_pair_fields(pair) for pair in graph.pairs],
         "seconds": seconds,
     }
 
@@ -277,6 +315,20 @@ def _how_matched(match: MatchResult | None, parameters: Any) -> Fields | None:
     if match is None:
         return None
     return {"method": match.method, "parameters": asdict(parameters), **_evidence(match)}
+
+
+def _pair_fields(pair: PairMatch) -> Fields:
+    return {
+        "i": pair.i,
+        "j": pair.j,
+        "state": str(pair.state),
+        "why": pair.why,
+        "T_i_j": pose_fields(pair.T_i_j),
+        "covariance": None if pair.covariance is None else pair.covariance.tolist(),
+        "bridge": pair.bridge,
+        "off": None if pair.off is None else {"metres": pair.off[0], "radians": pair.off[1]},
+        "match": _evidence(pair.result),
+    }
 
 
 def _evidence(result: MatchResult) -> Fields:

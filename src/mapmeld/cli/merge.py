@@ -11,13 +11,21 @@ import typer
 from mapmeld.cli.errors import NO_MATCH, say
 from mapmeld.cli.options import (
     DEFAULT_METHOD,
+    Cluster,
     Force,
     Fusion,
     Json,
+    KnownPoses,
     Method,
+    NoMatch,
     ParamsFile,
     Resolution,
     Settings,
+    Solver,
+    SolverChoice,
+    Store,
+    Strategy,
+    Workers,
     WriteMode,
 )
 
@@ -48,6 +56,19 @@ def merge(
         Path | None,
         typer.Option(metavar="PNG", help="Also draw the maps over one another, in colours."),
     ] = None,
+    strategy: Annotated[
+        Strategy,
+        typer.Option(
+            help="graph: all pairs, false matches found by contradiction; sequential: one after the other, "
+            "as in the paper."
+        ),
+    ] = Strategy.GRAPH,
+    known_poses: KnownPoses = None,
+    no_match: NoMatch = False,
+    solver: SolverChoice = Solver.OWN,
+    workers: Workers = 1,
+    cluster: Cluster = None,
+    store: Store = None,
     force: Force = False,
     json: Json = False,
     method: Method = DEFAULT_METHOD,
@@ -59,6 +80,7 @@ def merge(
 
     If some map cannot be joined, says why, writes nothing (but see --partial) and exits with 1.
     """
+    from mapmeld.cli.many_maps import known_for, progress_of
     from mapmeld.cli.maps import load_maps, names_of
     from mapmeld.cli.parameters import effective_parameters
     from mapmeld.cli.progress import working
@@ -69,13 +91,28 @@ def merge(
     _check_outputs(out, mode, overlay, force)
     _note_repeated(maps)
     parameters = effective_parameters(method, params, settings)
+    known, matching = known_for(maps, known_poses, no_match)
     started = time.perf_counter()
-    with working(f"Matching and merging {len(maps)} maps"):
+    with working(f"Reading {len(maps)} maps"):
         grids = load_maps(maps, resolution)
-        result = merge_maps(grids, method=method, parameters=parameters, fusion=fusion)
+    with progress_of(len(maps), strategy, matching) as on_pair:
+        result = merge_maps(
+            grids,
+            method=method,
+            parameters=parameters,
+            fusion=fusion,
+            strategy=strategy.value,
+            known_poses=known,
+            matching=matching,
+            solver=solver.value,
+            workers=0 if workers == 1 else workers,
+            cluster=cluster,
+            store=store,
+            on_pair=on_pair,
+        )
     seconds = time.perf_counter() - started
     files: tuple[Path, ...] = ()
-    if result.complete or (partial and result.joints):
+    if result.complete or (partial and len(result.components[0]) > 1):
         with working("Writing"):
             files = _write(result, grids, names_of(maps), out, mode, overlay, force)
 

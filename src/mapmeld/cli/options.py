@@ -58,6 +58,49 @@ Force = Annotated[bool, typer.Option("--force", help="Replace files that exist."
 PictureOut = Annotated[Path, typer.Option("-o", "--out", metavar="PNG", help="The picture to write.")]
 FolderOut = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="The folder to write.")]
 
+KnownPoses = Annotated[
+    Path | None,
+    typer.Option(
+        "--known-poses", metavar="YAML", help="Poses of maps that are known beforehand (docs/graph.md)."
+    ),
+]
+NoMatch = Annotated[
+    bool, typer.Option("--no-match", help="Match nothing: the maps lie where --known-poses says.")
+]
+Workers = Annotated[
+    int,
+    typer.Option(
+        "--workers", metavar="N", min=1, help="Processes, of one thread each; 1: all in this process."
+    ),
+]
+Cluster = Annotated[
+    str | None,
+    typer.Option("--cluster", metavar="ADDRESS", help="Work on the Dask cluster of this scheduler instead."),
+]
+Store = Annotated[
+    Path | None,
+    typer.Option("--store", metavar="DIR", help="Keep all matches there; a second run goes on from it."),
+]
+
+
+class Strategy(StrEnum):
+    """Those of `mapmeld.merge`."""
+
+    GRAPH = "graph"
+    SEQUENTIAL = "sequential"
+
+
+class Solver(StrEnum):
+    """Those of `mapmeld.merge`."""
+
+    OWN = "own"
+    GTSAM = "gtsam"
+
+
+SolverChoice = Annotated[
+    Solver, typer.Option("--solver", help="Of the robust optimisation; gtsam is an extra.")
+]
+
 
 class Fusion(StrEnum):
     """The rules of `mapmeld.merging.FUSIONS`, listed here so that help need not import them."""

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mapmeld.matching import MatchResult
-    from mapmeld.merging import MergeResult
+    from mapmeld.merging import MergeResult, PairMatch
+    from mapmeld.merging.graph import MapGraph
     from mapmeld.se2 import Pose2
 
 _COLOUR_OF = {"accepted": "bold green", "rejected": "bold red", "ambiguous": "bold yellow"}
@@ -134,10 +135,53 @@ def print_merge(result: MergeResult, names: Sequence[str]) -> None:
         out.print()
         line = Text(f"{names[index]} was not joined: ", style="bold red")
         out.print(line + Text(refused.reason, style="not bold default"), soft_wrap=True)
+    if len(result.poses) > 2:
+        print_pairs(result.pairs, names)
     groups = [component for component in result.components[1:] if len(component) > 1]
     for group in groups:
         members = ", ".join(names[i] for i in group)
         out.print(Text(f"These fit one another, but not map 1: {members}"), soft_wrap=True)
+
+
+def print_graph(graph: MapGraph, names: Sequence[str]) -> None:
+    """Print the components, the poses in them, and every pair that the graph has something to say of."""
+    names = [printable(name) for name in names]
+    out = console()
+    for number, members in enumerate(graph.components, start=1):
+        first = names[members[0]]
+        if len(members) == 1:
+            out.print(Text(f"Component {number}: {first} alone", style="bold"), soft_wrap=True)
+            continue
+        out.print(Text(f"Component {number}: transforms into the frame of {first}", style="bold"))
+        table = Table(box=None, padding=(0, 2, 0, 0), header_style="dim", pad_edge=False)
+        table.add_column("", justify="right")
+        table.add_column("map", overflow="fold")
+        for heading in ("x [m]", "y [m]", "theta [deg]", "std dev x, y [m]", "theta [deg]"):
+            table.add_column(Text(heading), justify="right", no_wrap=True)
+        for i in members:
+            covariance = graph.covariances[i]
+            x, y, theta = (math.sqrt(max(float(covariance[k, k]), 0.0)) for k in range(3))
+            spread = [f"{rounded(x, 3)}, {rounded(y, 3)}", rounded(math.degrees(theta), 2)]
+            table.add_row(str(i + 1), Text(names[i]), *_numbers(graph.poses[i]), *spread)
+        _print_table(table)
+    print_pairs(graph.pairs, names)
+
+
+def print_pairs(pairs: Sequence[PairMatch], names: Sequence[str]) -> None:
+    """Print how many matches are used, and each that is not simply used or unused, with the reason."""
+    if not pairs:
+        return
+    states = [str(pair.state) for pair in pairs]
+    told = ", ".join(
+        f"{states.count(state)} {state}"
+        for state in ("used", "settled", "false", "doubted")
+        if state in states or state == "used"
+    )
+    print_lines("", f"Of {len(pairs)} pairs: {told}.")
+    for pair in pairs:
+        if pair.state in ("false", "doubted", "settled") or pair.bridge:
+            state = "bridge" if pair.bridge else str(pair.state)
+            print_lines(f"  {state}: {names[pair.i]} - {names[pair.j]}: {pair.why}")
 
 
 def _numbers(pose: Pose2) -> list[str]:

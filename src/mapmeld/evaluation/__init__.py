@@ -9,7 +9,8 @@ from mapmeld.evaluation.plan import PlanError, Trial, plan_trials
 from mapmeld.evaluation.rows import TrialRow
 from mapmeld.evaluation.score import PoseErrors, Tolerance, accuracy, overlap_centroid, pose_errors
 from mapmeld.evaluation.tables import Summary, markdown_table, rich_table, summaries
-from mapmeld.evaluation.trials import WorkerDiedError, run_trials
+from mapmeld.evaluation.trials import run_trials
+from mapmeld.parallel import WorkerDiedError
 
 __all__ = [
     "Dataset",

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import random
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, is_dataclass, replace
-from functools import cache, lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
-import mapmeld
 from mapmeld.errors import MapmeldError
 from mapmeld.evaluation.pairs import Dataset, DatasetError, Pair
 from mapmeld.evaluation.rows import TrialKey
 from mapmeld.evaluation.score import Tolerance, overlap_centroid
-from mapmeld.grid import OccupancyGrid, overlap_share
+from mapmeld.fingerprint import code_version, grid_digest, parameters_json
+from mapmeld.grid import overlap_share
 from mapmeld.io import load
 from mapmeld.matching.match import method_named
 
@@ -161,26 +160,6 @@ def plan_trials(
     return tuple(trials)
 
 
-def parameters_json(settings: object) -> str:
-    """Return settings of a method as JSON with sorted keys."""
-    plain = asdict(settings) if is_dataclass(settings) and not isinstance(settings, type) else repr(settings)
-    return json.dumps(plain, sort_keys=True, default=str)
-
-
-@cache
-def code_version() -> str:
-    """Return mapmeld's version with a fingerprint of all that a matcher's answer depends on.
-
-    In a version that is being worked on, rows of yesterday's code must not pass for today's.
-    """
-    home = Path(mapmeld.__file__).parent
-    files = [home / "grid.py", home / "se2.py", *(home / "matching").rglob("*")]
-    digest = hashlib.blake2b(digest_size=5)
-    for file in sorted(f for f in files if f.is_file() and f.suffix != ".pyc"):
-        digest.update(file.relative_to(home).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
-    return f"{mapmeld.__version__}+{digest.hexdigest()}"
-
-
 def _chosen(pairs: Sequence[Pair], limit: int | None, seed: int) -> Iterable[Pair]:
     if limit is None or limit >= len(pairs):
         return pairs
@@ -219,11 +198,5 @@ class _Reader:
 
     def _digest(self, path: Path) -> bytes:
         if path not in self._digests:
-            self._digests[path] = _grid_digest(self._load(path))
+            self._digests[path] = grid_digest(self._load(path))
         return self._digests[path]
-
-
-def _grid_digest(grid: OccupancyGrid) -> bytes:
-    digest = hashlib.blake2b(repr((grid.shape, grid.resolution, grid.origin)).encode(), digest_size=16)
-    digest.update(grid.cells.tobytes())
-    return digest.digest()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from mapmeld.evaluation.score import PoseErrors, Tolerance
@@ -142,16 +141,3 @@ def judged(row: TrialRow, tolerance: Tolerance) -> TrialRow:
         tolerance_rotation=tolerance.rotation,
         right=is_right(errors, tolerance),
     )
-
-
-# Column types of the store, by the annotations above: changing a field changes what is stored.
-COLUMN_KINDS: Mapping[str, str] = {
-    "str": "string",
-    "str | None": "string",
-    "int": "int64",
-    "int | None": "int64",
-    "bool": "bool",
-    "float": "float64",
-    "float | None": "float64",
-    "tuple[float, ...] | None": "list",
-}

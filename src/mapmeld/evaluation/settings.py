@@ -14,8 +14,9 @@ import numpy as np
 import scipy
 
 from mapmeld.evaluation.pairs import Dataset
-from mapmeld.evaluation.plan import Trial, code_version
+from mapmeld.evaluation.plan import Trial
 from mapmeld.evaluation.score import Tolerance
+from mapmeld.fingerprint import code_version
 
 
 def settings_of(

@@ -1,24 +1,17 @@
-"""Runs what was planned: each trial on its own, in processes that use one thread each."""
+"""Runs what was planned: each trial on its own, by workers that use one thread each."""
 
 from __future__ import annotations
 
 import contextlib
 import math
-import multiprocessing
-import os
-import signal
-import threading
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from functools import lru_cache
+from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache, partial
 from itertools import groupby
 
 import cv2
 import numpy as np
 
-from mapmeld.errors import MapmeldError
 from mapmeld.evaluation.plan import Trial
 from mapmeld.evaluation.rows import ERROR, TrialKey, TrialRow, is_right, judged
 from mapmeld.evaluation.score import PoseErrors, pose_errors
@@ -26,29 +19,18 @@ from mapmeld.evaluation.turning import turned
 from mapmeld.grid import FREE, OCCUPIED, OccupancyGrid
 from mapmeld.io import load
 from mapmeld.matching import MatchResult, match
+from mapmeld.parallel import run_jobs
 from mapmeld.se2 import Pose2
 
-# Read by the numeric libraries when they are loaded, so they must be there before a worker starts.
-_THREAD_SETTINGS = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-    "NUMEXPR_NUM_THREADS",
-)
-
-Job = tuple[Trial, ...]
+Group = tuple[Trial, ...]
 """Trials on the same two maps, which are then loaded and turned once."""
-
-
-class WorkerDiedError(MapmeldError):
-    """A process that ran trials ended unexpectedly."""
 
 
 def run_trials(
     trials: Sequence[Trial],
     *,
     workers: int = 1,
+    cluster: str | None = None,
     finished: Iterable[TrialRow] = (),
     keep: Callable[[Sequence[TrialRow]], object] | None = None,
     on_row: Callable[[TrialRow], object] | None = None,
@@ -63,11 +45,10 @@ def run_trials(
     ----------
     trials
         As made by `mapmeld.evaluation.plan_trials`.
-    workers
-        Number of processes. They are started afresh and import the program that calls this, so in a
-        script the call belongs under ``if __name__ == "__main__"``. 0 runs everything in the calling
-        process, where a crash of a matcher is a crash of the caller and NumPy's own threads are left
-        as they are.
+    workers, cluster
+        Who runs them, see `mapmeld.parallel.run_jobs`. With ``workers=0`` a crash of a matcher is a crash of
+        the caller, and NumPy's own threads are left as they are. Maps are read where the trials are run,
+        so the workers of a cluster must find them under the same paths.
     finished
         Rows of earlier runs. A trial that has one is not run again; its row is judged by the trial's
         tolerance.
@@ -82,20 +63,29 @@ def run_trials(
     Raises
     ------
     WorkerDiedError
-        A process died (killed, out of memory, crashed inside a library).
+        Processes died (killed, out of memory, crashed inside a library), and did so again and again.
+    ClusterError
+        The cluster cannot be used.
     """
-    if workers < 0:
-        raise ValueError(f"the number of workers cannot be negative, as {workers} is")
     wanted = {trial.key: trial for trial in trials}
     rows: dict[TrialKey, TrialRow] = {
         row.key: judged(row, wanted[row.key].tolerance) for row in finished if row.key in wanted
     }
-    jobs = _jobs([trial for key, trial in wanted.items() if key not in rows])
+    groups = _groups([trial for key, trial in wanted.items() if key not in rows])
+    methods = sorted({name for group in groups for t in group for name in (t.method, t.time_against) if name})
+    answers = run_jobs(
+        _run_group,
+        [(group,) for group in groups],
+        workers=workers,
+        cluster=cluster,
+        prepare=partial(_warm_up, methods),
+    )
+    threads = cv2.getNumThreads()
     batch: list[TrialRow] = []
     due = time.monotonic() + batch_seconds
     try:
-        with contextlib.closing(_answers(jobs, workers)) as answers:
-            for new in answers:
+        with contextlib.closing(answers):
+            for _, new in answers:
                 batch += new
                 for row in new:
                     rows[row.key] = row
@@ -106,81 +96,15 @@ def run_trials(
                     batch = []
                     due = time.monotonic() + batch_seconds
     finally:
+        cv2.setNumThreads(threads)
         if keep and batch:
             keep(batch)
     return tuple(rows[trial.key] for trial in trials)
 
 
-def _jobs(trials: Iterable[Trial]) -> list[Job]:
+def _groups(trials: Iterable[Trial]) -> list[Group]:
     same_maps = groupby(trials, key=lambda t: (t.dataset, t.pair.id, t.turn_seed, t.swapped))
     return [tuple(group) for _, group in same_maps]
-
-
-# ---------------------------------------------------------------------- processes
-def _answers(jobs: Sequence[Job], workers: int) -> Generator[list[TrialRow], None, None]:
-    """Yield the rows of each job when it is done."""
-    if not jobs:
-        return
-    methods = sorted({name for job in jobs for t in job for name in (t.method, t.time_against) if name})
-    if workers == 0:
-        threads = cv2.getNumThreads()
-        _warm_up(methods)
-        try:
-            for job in jobs:
-                yield _run_job(job)
-        finally:
-            cv2.setNumThreads(threads)
-        return
-    # "spawn" because a fork of a process with threads (progress display, OpenCV) can deadlock.
-    pool = ProcessPoolExecutor(
-        min(workers, len(jobs)), multiprocessing.get_context("spawn"), _start_worker, (methods,)
-    )
-    done = False
-    try:
-        with _one_thread_each():
-            futures: list[Future[list[TrialRow]]] = [pool.submit(_run_job, job) for job in jobs]
-        for future in as_completed(futures):
-            yield future.result()
-        done = True
-    except BrokenProcessPool as error:
-        raise WorkerDiedError(
-            "a worker process died (out of memory, or a crash in a library); "
-            "run the same again to continue, with fewer workers if memory is short"
-        ) from error
-    finally:
-        if not done:
-            # After an interruption nobody wants to wait for the matches that are under way.
-            for process in list((pool._processes or {}).values()):
-                process.terminate()
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-@contextlib.contextmanager
-def _one_thread_each() -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in _THREAD_SETTINGS}
-    os.environ.update(dict.fromkeys(_THREAD_SETTINGS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
-def _start_worker(methods: Sequence[str]) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; the parent ends the workers
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    _warm_up(methods)
-
-
-def _end_with_parent() -> None:
-    """Leave when the parent is gone: a worker that waits for its next job would wait for ever."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _warm_up(methods: Sequence[str]) -> None:
@@ -199,8 +123,8 @@ def _warm_up(methods: Sequence[str]) -> None:
 _load = lru_cache(maxsize=2)(load)
 
 
-def _run_job(job: Job) -> list[TrialRow]:
-    first = job[0]
+def _run_group(group: Group) -> list[TrialRow]:
+    first = group[0]
     a, b, T_a_b = _load(first.pair.map_1), _load(first.pair.map_2), first.pair.T_1_2
     centroid = first.pair.centroid
     if first.turn_seed is not None:
@@ -213,7 +137,7 @@ def _run_job(job: Job) -> list[TrialRow]:
             if centroid is not None:
                 x, y = T_a_b.apply(centroid)
                 centroid = (float(x), float(y))
-    return [_run_trial(trial, a, b, T_a_b, centroid) for trial in job]
+    return [_run_trial(trial, a, b, T_a_b, centroid) for trial in group]
 
 
 def _run_trial(

@@ -37,6 +37,13 @@ class Nested:
     """Stands for a value that no field has."""
 
 
+@dataclass(frozen=True, slots=True)
+class Fields(Nested):
+    """A mapping as a value: its keys, each once, and what they stand for."""
+
+    of: dict[str, Scalar | Nested]
+
+
 Value = Scalar | list["Scalar | Nested"] | Nested
 
 Tree = Scalar | list["Tree"] | dict[str, "Tree"]
@@ -219,7 +226,17 @@ class _Reader:
                 depth -= 1
             elif depth == 1 and isinstance(event, yaml.ScalarEvent):
                 items.append(Scalar(event.value, quoted=event.style is not None))
-        return items if is_list else Nested()
+        return items if is_list else self._fields(items, event)
+
+    def _fields(self, items: list[Scalar | Nested], event: yaml.Event) -> Nested:
+        values: dict[str, Scalar | Nested] = {}
+        for key, value in zip(items[::2], items[1::2], strict=True):
+            if not isinstance(key, Scalar):
+                return Nested()
+            if key.value in values:
+                self.fail(f"gives {short(key.value)} twice before line {_line(event)}")
+            values[key.value] = value
+        return Fields(values)
 
     def _harmless(self, events: Iterator[yaml.Event]) -> Iterator[yaml.Event]:
         """Refuse what could multiply (aliases), make objects (tags) or keep the parser busy (depth)."""

@@ -1,0 +1,111 @@
+"""Jobs in a pool of processes of this machine."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, TypeVar
+
+from mapmeld.parallel.jobs import RESTARTS, Job, WorkerDiedError, filled
+
+R = TypeVar("R")
+
+# Read by the numeric libraries when they are loaded, so they must be there before a worker starts.
+_THREAD_SETTINGS = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+)
+
+_shared: Sequence[object] = ()
+
+
+def run_in_pool(
+    function: Callable[..., R],
+    jobs: Sequence[Job],
+    shared: Sequence[object],
+    workers: int,
+    prepare: Callable[[], object] | None,
+) -> Generator[tuple[int, R]]:
+    """As `mapmeld.parallel.run_jobs`, by so many processes."""
+    waiting = dict(enumerate(jobs))
+    for _ in range(RESTARTS + 1):
+        # "spawn" because a fork of a process with threads (progress display, OpenCV) can deadlock.
+        context = multiprocessing.get_context("spawn")
+        pool = ProcessPoolExecutor(workers, context, _start_worker, (shared, prepare))
+        whole = False
+        try:
+            futures = _submitted(pool, function, waiting)
+            for future in as_completed(futures):
+                try:
+                    result = future.result()
+                except BrokenProcessPool:
+                    continue  # what others had finished by then is still to come
+                del waiting[futures[future]]
+                yield futures[future], result
+            whole = not waiting
+        finally:
+            if not whole:
+                # After an interruption nobody wants to wait for the jobs that are under way.
+                for process in list((pool._processes or {}).values()):
+                    process.terminate()
+            pool.shutdown(wait=True, cancel_futures=True)
+        if not waiting:
+            return
+    raise WorkerDiedError(
+        "worker processes died again and again (out of memory, or a crash in a library); "
+        "run the same again to continue, with fewer workers if memory is short"
+    )
+
+
+def _submitted(
+    pool: ProcessPoolExecutor, function: Callable[..., R], waiting: dict[int, Job]
+) -> dict[Future[R], int]:
+    futures: dict[Future[R], int] = {}
+    with _one_thread_each(), contextlib.suppress(BrokenProcessPool):
+        for number, job in waiting.items():
+            futures[pool.submit(_call, function, job)] = number
+    return futures
+
+
+def _call(function: Callable[..., R], job: Job) -> R:
+    return function(*filled(job, _shared))
+
+
+@contextlib.contextmanager
+def _one_thread_each() -> Iterator[None]:
+    before = {name: os.environ.get(name) for name in _THREAD_SETTINGS}
+    os.environ.update(dict.fromkeys(_THREAD_SETTINGS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _start_worker(shared: Sequence[object], prepare: Callable[[], Any] | None) -> None:
+    global _shared
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; the parent ends the workers
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    _shared = shared
+    if prepare:
+        prepare()
+
+
+def _end_with_parent() -> None:
+    """Leave when the parent is gone: a worker that waits for its next job would wait for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
