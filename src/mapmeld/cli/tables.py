@@ -163,7 +163,7 @@ def print_graph(graph: MapGraph, names: Sequence[str]) -> None:
             x, y, theta = (math.sqrt(max(float(covariance[k, k]), 0.0)) for k in range(3))
             spread = [f"{rounded(x, 3)}, {rounded(y, 3)}", rounded(math.degrees(theta), 2)]
             table.add_row(str(i + 1), Text(names[i]), *_numbers(graph.poses[i]), *spread)
-        _print_table(table)
+        print_table(table)
     print_pairs(graph.pairs, names)
 
 
