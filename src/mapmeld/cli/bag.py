@@ -120,8 +120,9 @@ def _print(found: RecordingInfo) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from mapmeld.cli.tables import print_lines, print_table, rounded
+    from mapmeld.cli.tables import print_lines, print_table
     from mapmeld.io import printable
+    from mapmeld.wording import rounded
 
     if not found.topics:
         print_lines("No maps in this recording.")
