@@ -244,12 +244,12 @@ def test_snapshots_by_seconds_and_by_states(histories: tuple[Path, Path], tmp_pa
             snapshots.take(step)
         return sorted(path.stem for path in folder.glob("*.yaml")) if snapshots.finish() else []
 
-    assert taken(Interval(states=2), steps) == ["00004"]
-    assert taken(Interval(seconds=8.0), steps) == ["00005"]
+    assert taken(Interval(states=2), steps) == ["state_00004"]
+    assert taken(Interval(seconds=8.0), steps) == ["state_00005"]
     assert taken(Interval(seconds=1000.0), steps) == []
     timeless = [replace(step, stamp=None) for step in steps]
     assert taken(Interval(seconds=1.0), timeless) == []
-    assert taken(Interval(states=1), timeless) == ["00004", "00005"]
+    assert taken(Interval(states=1), timeless) == ["state_00004", "state_00005"]
 
 
 @pytest.mark.parametrize(

@@ -134,7 +134,7 @@ def test_other_columns_are_refused(tmp_path: Path) -> None:
     part = tmp_path / parts(tmp_path)[0]
     table = pyarrow.parquet.read_table(part).drop_columns(["seconds"])
     pyarrow.parquet.write_table(table, part)
-    with pytest.raises(StoreError, match=r"other columns.*--force"):
+    with pytest.raises(StoreError, match=r"other columns.*force=True"):
         read_rows(tmp_path)
 
 

@@ -130,7 +130,7 @@ def _read_part(part: Path) -> list[TrialRow]:
     if not table.schema.equals(_schema()):
         raise StoreError(
             f"{part}: has other columns than this version of mapmeld writes; "
-            f"use another folder, or --force to start afresh"
+            "use another folder, or force=True to start afresh"
         )
     return [_row(values) for values in table.to_pylist()]
 
