@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -54,9 +55,16 @@ def transform_points(
     from mapmeld.cli.json_output import as_json, transform_points_fields
     from mapmeld.cli.maps import load_maps
     from mapmeld.cli.parameters import effective_parameters
-    from mapmeld.cli.placement import Placement, accepted_match, given_transform, transform_of_numbers
+    from mapmeld.cli.placement import (
+        Placement,
+        accepted_match,
+        given_transform,
+        note_if_unlikely,
+        transform_of_numbers,
+    )
     from mapmeld.cli.progress import working
     from mapmeld.cli.tables import pose_text, print_lines
+    from mapmeld.io import MapFileError
     from mapmeld.io.atomic import check_targets, write_files
 
     _check_usage(from_map, to_map, transform)
@@ -67,6 +75,10 @@ def transform_points(
         placed = Placement(transform_of_numbers(transform or ""), None)
     elif transform is not None:
         placed = Placement(given_transform(transform, to_map, from_map), None)
+        # Only their names are needed, so they may be elsewhere.
+        with working("Weighing"), suppress(MapFileError):
+            grid_to, grid_from = load_maps([to_map, from_map], resolution)
+            note_if_unlikely(transform, placed.T_a_b, grid_to, grid_from)
     else:
         with working("Matching"):
             grid_to, grid_from = load_maps([to_map, from_map], resolution)
