@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from mapmeld.history import EvidenceParameters
+from mapmeld.matching.correlative import CorrelativeParameters
+
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
@@ -47,6 +50,25 @@ def test_commands_run_and_exit_as_shown(block: str, workplace: Path) -> None:
             [sys.executable, "-m", *command.split()], capture_output=True, text=True, stdin=subprocess.DEVNULL
         )
         assert run.returncode == expected, f"{command}\n{run.stdout}\n{run.stderr}"
+
+
+def test_examples_run_one_after_the_other_do_not_write_over_one_another() -> None:
+    written: list[str] = []
+    for block in blocks("console"):
+        for command in re.findall(r"^\$ (.*)$", block.values[0], re.M):  # type: ignore[attr-defined]
+            written += re.findall(r" (?:-o|--out|--strip|--gif|--rerun) (\S+)", command)
+    for block in blocks("python"):
+        written += re.findall(r"""(?:save|write_history)\(.*["']([\w.]+)["']\)""", block.values[0])  # type: ignore[attr-defined]
+    assert len(written) > 10
+    assert sorted(written) == sorted(set(written))
+
+
+def test_the_thresholds_of_histories_are_those_of_the_code() -> None:
+    text = " ".join((ROOT / "docs" / "histories.md").read_text(encoding="utf-8").split())
+    evidence = EvidenceParameters()
+    assert f"`accept_probability` ({CorrelativeParameters().accept_probability:g} unless set)" in text
+    assert f"at least {evidence.keep_probability:g} in the newest state" in text
+    assert f"or one reaches {evidence.sure_probability:g}" in text
 
 
 def test_the_readme_has_the_two_set_up_commands_and_ci_runs_the_second() -> None:

@@ -178,5 +178,11 @@ def test_changes_as_polygons_in_metres() -> None:
     assert feature["bbox"] == pytest.approx([x.min(), y.min(), x.max(), y.max()])
     # It is GeoJSON by this module's own reading, and keeps its meaning when it is carried over.
     again = moved_geojson(content, QUARTER)
-    assert again["features"][0]["properties"] == feature["properties"]
+    moved = again["features"][0]["properties"]
+    assert {**moved, "centroid": None} == {**feature["properties"], "centroid": None}
+    assert moved["centroid"] == pytest.approx(QUARTER.apply(feature["properties"]["centroid"]))
+    assert "old.yaml" not in again["note"], "they are not in its frame any more"
+    named = moved_geojson(again, QUARTER.inverse(), "new.yaml")
+    assert "new.yaml" in named["note"]
+    assert named["features"][0]["properties"]["centroid"] == pytest.approx(feature["properties"]["centroid"])
     assert json.loads(geojson_text(content)) == content

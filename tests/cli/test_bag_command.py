@@ -160,6 +160,21 @@ def test_export_of_what_can_be_read(damaged: Path, tmp_path: Path) -> None:
     assert "left out" in done.line
 
 
+def test_damage_counts_once_for_several_topics(damaged: Path, tmp_path: Path) -> None:
+    topics = ["--topic", "/robot_1/map", "--topic", "/robot_2/map"]
+    done = run("bag", "export", damaged, *topics, "-o", tmp_path / "h", "--damaged", "use")
+    assert done.code == 0
+    assert "left out" in done.line
+    assert "times)" not in done.line
+
+
+def test_where_no_map_can_be_read(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[:300])
+    done = run("bag", "info", file, "--damaged", "use")
+    assert "No maps could be read from this recording." in done.out
+    assert "cut off" in done.line
+
+
 def test_progress_goes_to_no_pipe(file: Path, tmp_path: Path) -> None:
     done = run_for_real("bag", "export", file, "--topic", "/robot_1/map", "-o", "history", cwd=tmp_path)
     assert (done.code, done.err) == (0, "")

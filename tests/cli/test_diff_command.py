@@ -91,9 +91,17 @@ def test_the_answer_of_a_match_can_be_given(tmp_path: Path) -> None:
     a, b = write_maps(tmp_path, "a", "b")
     (tmp_path / "m.json").write_text(run("match", b, a, "--json").out)
     outcome = run("diff", a, b, "-o", tmp_path / "d", "--transform", tmp_path / "m.json", "--json")
+    assert outcome.err == "", "the walls support it"
     printed = json.loads(outcome.out)
     assert mapmeld.Pose2(**printed["T_old_new"]).distance_to(T_A_B)[0] < 0.1
     assert printed["regions"] == []
+
+
+def test_a_wrong_transform_is_carried_out_with_a_note(tmp_path: Path) -> None:
+    a, b = write_maps(tmp_path, "a", "b")
+    outcome = run("diff", a, b, "-o", tmp_path / "d", "--transform", "4,-3,50")
+    assert outcome.code == 0
+    assert "note: the walls do not support --transform 4,-3,50 (probability" in outcome.line
 
 
 def test_settings_are_heeded(tmp_path: Path) -> None:

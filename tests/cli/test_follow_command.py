@@ -74,6 +74,8 @@ def test_nothing_accepted_is_exit_code_1(
     done = run("follow", histories[0], elsewhere, "-o", tmp_path / "out")
     assert done.code == 1
     assert "No match is accepted, so nothing is merged." in done.out
+    assert "T_1_2 " not in done.out, "a guess is no result"
+    assert "std dev" not in done.out
     assert contents(tmp_path / "out") == {"transform.json"}
     written = json.loads((tmp_path / "out" / "transform.json").read_text())
     assert (written["standing"], written["T_1_2"], written["changes"]) == ("undecided", None, [])
@@ -141,6 +143,10 @@ def test_topics_of_recordings_and_folders_can_be_mixed(tmp_path: Path) -> None:
         (["a"], "a is no recording; name a second history"),
         (["a", "b", "c"], "two histories are needed, not 3"),
         (["a", "b", *TOPICS], "of two, name each as RECORDING#topic"),
+        (["a", "a"], "a is named twice; two robots are needed"),
+        (["a", "b/../a"], "is named twice"),
+        ([str(RECORDING), "--topics", "/robot_1/map", "/robot_1/map"], "/robot_1/map is named twice"),
+        ([f"{RECORDING}#/robot_1/map"] * 2, "is named twice"),
         (["a", "nowhere"], "nowhere: there is no such folder"),
         (["a", f"{RECORDING}#/robot_1/map@30"], "leave out what follows '@'"),
         ([f"{RECORDING}#/robot_1/map"], "is one map; name a second one"),
@@ -238,12 +244,12 @@ def test_snapshots_by_seconds_and_by_states(histories: tuple[Path, Path], tmp_pa
             snapshots.take(step)
         return sorted(path.stem for path in folder.glob("*.yaml")) if snapshots.finish() else []
 
-    assert taken(Interval(states=2), steps) == ["00004"]
-    assert taken(Interval(seconds=8.0), steps) == ["00005"]
+    assert taken(Interval(states=2), steps) == ["state_00004"]
+    assert taken(Interval(seconds=8.0), steps) == ["state_00005"]
     assert taken(Interval(seconds=1000.0), steps) == []
     timeless = [replace(step, stamp=None) for step in steps]
     assert taken(Interval(seconds=1.0), timeless) == []
-    assert taken(Interval(states=1), timeless) == ["00004", "00005"]
+    assert taken(Interval(states=1), timeless) == ["state_00004", "state_00005"]
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from running import T_A_B, run, run_for_real, write_maps
 
-from mapmeld.cli.tables import probability_text
 from mapmeld.matching import METHODS, Alternative, MatchResult, Verdict
 from mapmeld.se2 import Pose2
+from mapmeld.wording import probability_text
 
 
 def test_an_accepted_match(tmp_path: Path) -> None:

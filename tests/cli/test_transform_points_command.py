@@ -88,6 +88,58 @@ MATCH = {
 }
 
 
+def test_a_transform_is_weighed_where_the_maps_are_there(tmp_path: Path) -> None:
+    a, b = write_maps(tmp_path, "a", "b")
+    points = write(tmp_path, "p.yaml")
+    arguments = ["--from", a, "--to", b, "-o", tmp_path / "o.yaml", "--transform", "1,2,10"]
+    outcome = run("transform-points", points, *arguments)
+    assert outcome.code == 0
+    assert "the walls do not support" in outcome.line
+
+
+FOLLOWED = {
+    "schema": "mapmeld.follow/1",
+    "processes": {"1": "runs/a", "2": "runs/b"},
+    "standing": "accepted",
+    "T_1_2": {"x": 1, "y": 2, "theta": 0.5},
+    "best": {"reason": "as a test"},
+}
+ROBOTS = {"1": "run.mcap#/robot_1/map", "2": "run.mcap#/robot_2/map"}
+
+
+@pytest.mark.parametrize(
+    ("change", "to_map", "from_map", "code", "said"),
+    [
+        ({}, "runs/a/9.yaml", "runs/b/8.yaml", 0, (1, 2)),
+        ({}, "runs/b/8.yaml", "runs/a/9.yaml", 0, None),
+        ({}, "runs/c/8.yaml", "runs/a/9.yaml", 2, "is about runs/a and runs/b"),
+        ({}, "a.yaml", "b.yaml", 2, "is about runs/a and runs/b"),
+        ({"processes": ROBOTS}, ROBOTS["1"], ROBOTS["2"], 0, (1, 2)),
+        (
+            {"standing": "withdrawn", "T_1_2": None},
+            "runs/a/9.yaml",
+            "runs/b/8.yaml",
+            1,
+            "withdrawn: as a test",
+        ),
+        ({"processes": None}, "runs/a/9.yaml", "runs/b/8.yaml", 2, "which maps"),
+    ],
+)
+def test_the_outcome_of_following_can_be_given(
+    tmp_path: Path, change: dict[str, object], to_map: str, from_map: str, code: int, said: object
+) -> None:
+    outcome = write(tmp_path, "transform.json", json.dumps({**FOLLOWED, **change}))
+    points = write(tmp_path, "p.yaml", "points: [{x: 0.0, y: 0.0}]\n")
+    arguments = ["--to", to_map, "--from", from_map, "--transform", outcome, "-o", tmp_path / "o.yaml"]
+    done = run("transform-points", points, *arguments)
+    assert done.code == code, done.err
+    if isinstance(said, str):
+        assert said in done.line
+    else:
+        (point,) = yaml.safe_load((tmp_path / "o.yaml").read_text())["points"]
+        assert ((point["x"], point["y"]) == (1, 2)) is (said is not None)
+
+
 @pytest.mark.parametrize(
     ("change", "maps", "code", "said"),
     [

@@ -27,7 +27,9 @@ def test_permissions_are_those_of_any_new_file(tmp_path: Path) -> None:
 
 def test_nothing_is_overwritten_unasked(tmp_path: Path) -> None:
     (tmp_path / "b").write_text("old")
-    with pytest.raises(MapFileError, match=r"b: exists already; choose another name, or force"):
+    with pytest.raises(
+        MapFileError, match=r"b: exists already; choose another name, or force=True to replace it"
+    ):
         write_files([(tmp_path / "a", (b"new",)), (tmp_path / "b", (b"new",))])
     assert names(tmp_path) == ["b"]
     assert (tmp_path / "b").read_text() == "old"

@@ -16,6 +16,7 @@ from hypothesis.extra import numpy as npst
 from mapmeld.grid import OccupancyGrid
 from mapmeld.io import MapFileError, load
 from mapmeld.io.folders import FolderError
+from mapmeld.io.history import read_history
 from mapmeld.io.history_writer import write_history
 from mapmeld.se2 import Pose2
 
@@ -31,11 +32,11 @@ def times_of(folder: Path) -> list[tuple[str, float]]:
 def test_maps_and_times(tmp_path: Path) -> None:
     folder = tmp_path / "history"
     files = write_history(iter([PLAIN, PERCENT]), folder)
-    assert files == (folder / "00000.yaml", folder / "00001.yaml")
+    assert files == (folder / "state_00000.yaml", folder / "state_00001.yaml")
     assert {file.name for file in folder.iterdir()} == {
-        "00000.yaml", "00000.pgm", "00001.yaml", "00001.pgm", "times.txt",
+        "state_00000.yaml", "state_00000.pgm", "state_00001.yaml", "state_00001.pgm", "times.txt",
     }  # fmt: skip
-    assert times_of(folder) == [("00000.yaml", 12.5), ("00001.yaml", 1700000000.123456)]
+    assert times_of(folder) == [("state_00000.yaml", 12.5), ("state_00001.yaml", 1700000000.123456)]
     assert (folder / "times.txt").read_text().splitlines()[:2] == ["# map  stamp [s]", "# frame_id: r1/map"]
     for grid, file in zip([PLAIN, PERCENT], files, strict=True):
         assert load(file) == replace(grid, frame_id="")
@@ -58,7 +59,7 @@ def test_nothing_is_lost(
     grid = OccupancyGrid(cells, 0.05, Pose2(0.1, 0.2, 0.3), stamp)
     (file,) = write_history([grid], folder)
     assert load(file) == grid
-    assert times_of(folder) == [("00000.yaml", stamp)]
+    assert times_of(folder) == [("state_00000.yaml", stamp)]
 
 
 def test_a_frame_that_changes_is_noted_where_it_does(tmp_path: Path) -> None:
@@ -67,8 +68,8 @@ def test_a_frame_that_changes_is_noted_where_it_does(tmp_path: Path) -> None:
     )
     assert (tmp_path / "h" / "times.txt").read_text().splitlines()[3:] == [
         "# frame_id: odd\\nname",
-        "00001.yaml 12.5",
-        "00002.yaml 12.5",
+        "state_00001.yaml 12.5",
+        "state_00002.yaml 12.5",
     ]
 
 
@@ -80,6 +81,13 @@ def test_an_error_on_the_way_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(MapFileError, match="the recording ends here"):
         write_history(failing(), tmp_path / "history")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_without_its_times_a_history_is_not_read_by_its_counters(tmp_path: Path) -> None:
+    write_history([PLAIN, PERCENT], tmp_path / "history")
+    (tmp_path / "history" / "times.txt").unlink()
+    with pytest.raises(MapFileError, match=r"state_00000\.yaml: its name is no time"):
+        read_history(tmp_path / "history")
 
 
 def test_no_states_no_folder(tmp_path: Path) -> None:
@@ -100,9 +108,9 @@ def test_nothing_is_overwritten_unasked(tmp_path: Path) -> None:
     assert len(times_of(folder)) == 3
     write_history([PERCENT], folder, force=True)
     assert {file.name for file in folder.iterdir()} == {
-        "00000.yaml", "00000.pgm", "times.txt", "notes.md", "2024.yaml",
+        "state_00000.yaml", "state_00000.pgm", "times.txt", "notes.md", "2024.yaml",
     }  # fmt: skip
-    assert times_of(folder) == [("00000.yaml", PERCENT.stamp)]
+    assert times_of(folder) == [("state_00000.yaml", PERCENT.stamp)]
 
 
 def test_where_there_is_no_folder_to_write_into(tmp_path: Path) -> None:

@@ -11,11 +11,14 @@ from drawing import cut, office, seen_from
 
 from mapmeld.errors import MapmeldError
 from mapmeld.grid import OccupancyGrid
-from mapmeld.history import Step, follow
+from mapmeld.history import Change, Step, Work, follow
 from mapmeld.report import PictureError
+from mapmeld.report import film as film_module
 from mapmeld.report.canvas import Picture
-from mapmeld.report.film import FRAMES, STRIP_FRAMES, Film, check_gif_path, frames, strip, write_gif
-from mapmeld.report.palette import BLUE, GREEN, RED
+from mapmeld.report.film import FRAMES, STRIP_FRAMES, TURNS, Film, check_gif_path, frames, strip, write_gif
+from mapmeld.report.lettering import wrapped
+from mapmeld.report.palette import BLUE, GREEN, RED, Colour
+from mapmeld.report.sheet import Panel, compose
 from mapmeld.se2 import Pose2
 
 T_2_PLACE = Pose2(3.0, -2.0, 0.7)
@@ -119,3 +122,58 @@ def test_an_opencv_that_writes_none(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.delattr(cv2, "imencodeanimation", raising=False)
     with pytest.raises(PictureError, match="draw a strip"):
         check_gif_path(tmp_path / "film.gif")
+
+
+# ---------------------------------------------------------------------- which moments, and what is said
+def test_a_strip_has_the_moments_where_something_happened(steps: list[Step]) -> None:
+    turns = {40: Change.FOUND, 41: Change.WITHDRAWN, 90: Change.SWITCHED}
+    calm = replace(steps[-1], change=Change.CONFIRMED, work=Work.CHECK)
+    film = film_of(
+        [
+            replace(calm, number=n, stamp=float(n), change=turns.get(n, Change.CONFIRMED))
+            for n in range(1, 201)
+        ]
+    )
+    assert [step.number for step in film.moments()] == [film.steps()[0].number, 40, 41, 90, 144, 200]
+
+
+def test_of_endless_turns_the_first_and_the_newest_are_kept(steps: list[Step]) -> None:
+    film = film_of(
+        [replace(steps[-1], number=n, change=Change.FOUND, work=Work.CHECK) for n in range(1, 500)]
+    )
+    assert len(film.steps()) <= FRAMES + 1 + TURNS
+    assert [step.number for step in film.moments() if step.number not in (8, 16)][-3:] == [497, 498, 499]
+    assert len(film.moments()) <= STRIP_FRAMES
+
+
+def test_states_as_they_were_are_passed_over(steps: list[Step]) -> None:
+    same = replace(steps[-1], number=9, work=Work.NOTHING, change=Change.NONE)
+    assert [step.number for step in film_of([*steps, same]).steps()] == [2, 3, 4, 5]
+
+
+def test_times_count_from_the_first_state_and_probabilities_are_those_of_the_table(
+    steps: list[Step], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+
+    def noted(panels: Sequence[Panel], caption: str, legend: Sequence[tuple[Colour, str]]) -> Picture:
+        said.extend(panel.name for panel in panels)
+        return compose(panels, caption, legend)
+
+    monkeypatch.setattr(film_module, "compose", noted)
+    best = steps[-1].best
+    assert best is not None
+    last = replace(steps[-1], best=replace(best, probability=0.975))
+    strip(film_of([*steps[:-1], last]))
+    assert said[0].startswith("4.0 s: undecided"), "state 1, without the other map, came 4 s before"
+    assert said[-1] == "16.0 s: accepted, p = 0.975"
+    strip(film_of([replace(last, best=replace(best, probability=0.9999))]))
+    assert said[-1].endswith("p > 0.999")
+
+
+def test_captions_of_narrow_maps_break_between_words(steps: list[Step]) -> None:
+    narrow = cut(office(0.1), 0, 0, 1, 12)
+    walls = list(follow([narrow], [narrow]))
+    lines = wrapped("123.4 s: undecided, p = 0.975", 0.8, 200, bold=True)
+    assert " ".join(lines) == "123.4 s: undecided, p = 0.975", "no word is cut"
+    assert strip(film_of(walls)).shape[1] >= 200

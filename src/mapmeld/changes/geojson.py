@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
@@ -36,11 +37,12 @@ def position_count(content: Json) -> int:
     return sum(1 for _ in _positions(content))
 
 
-def moved_geojson(content: Json, T: Pose2) -> Json:
+def moved_geojson(content: Json, T: Pose2, to: str = "to which they were carried") -> Json:
     """Return GeoJSON in the frame that `T` takes points to.
 
     Positions are moved, a third coordinate is kept, and every ``bbox`` is computed anew. All else is
-    kept as it is: properties too, whatever they say about places or directions.
+    kept as it is: properties too, whatever they say about places or directions. Only in what
+    `changes_geojson` made, the note then names the map `to`, and the centroids are moved.
 
     Raises
     ------
@@ -48,7 +50,7 @@ def moved_geojson(content: Json, T: Pose2) -> Json:
         It is not GeoJSON, or a number is too large.
     """
     try:
-        return _moved(content, T)
+        return _changes_moved(_moved(content, T), T, to)
     except RecursionError:
         raise GeoJsonError("nests its values too deep") from None
 
@@ -77,6 +79,28 @@ def _moved(content: Any, T: Pose2) -> Json:
         if box is not None:
             moved["bbox"] = box
     return moved
+
+
+def _changes_moved(content: Json, T: Pose2, to: str) -> Json:
+    """Carry over what, besides the positions, `changes_geojson` says of places."""
+    if content["type"] != "FeatureCollection" or not _NOTE_OF_ANY.fullmatch(str(content.get("note"))):
+        return content
+    features = []
+    for feature in content["features"]:
+        properties = feature.get("properties")
+        centroid = properties.get("centroid") if isinstance(properties, dict) else None
+        if isinstance(centroid, list) and len(centroid) == 2 and all(map(_is_number, centroid)):
+            moved = _moved_positions(centroid, 0, "centroid", T)
+            feature = {**feature, "properties": {**properties, "centroid": moved}}
+        features.append(feature)
+    return {**content, "note": _note(to), "features": features}
+
+
+def _note(name: str) -> str:
+    return f"Coordinates are metres in the frame of the map {name}, not longitude and latitude."
+
+
+_NOTE_OF_ANY = re.compile(r"Coordinates are metres in the frame of the map .*, not longitude and latitude\.")
 
 
 def _only(content: Any, kinds: Collection[str], T: Pose2) -> Json:
@@ -158,7 +182,7 @@ def changes_geojson(diff: MapDiff, old_name: str) -> Json:
     """Return the changes as a FeatureCollection of Polygons, numbered from 1, the greatest first."""
     return {
         "type": "FeatureCollection",
-        "note": f"Coordinates are metres in the frame of the map {old_name}, not longitude and latitude.",
+        "note": _note(old_name),
         "features": [_feature(number, region) for number, region in enumerate(diff.regions, start=1)],
     }
 

@@ -92,6 +92,7 @@ def export(
         left_out += states.left_out
     else:
         folders = _folders_of(topics)
+        damage: Counter[str] = Counter()
         with whole_folder(out, force=force, ours=()) as folder:
             for name in topics:
                 states = map_states(file, name, damaged=damaged.value)
@@ -99,7 +100,9 @@ def export(
                     counted(states, f"Exporting {states.topic}"), folder / folders[name], force=force
                 )
                 written[states.topic] = out / folders[name], len(maps)
-                left_out += states.left_out
+                left_out += states.left_out - states.damage
+                damage = states.damage
+        left_out += damage  # the same for all
     print_lines(*(f"{name}: {count} maps in {place}" for name, (place, count) in written.items()))
     _say_left_out(file, left_out)
 
@@ -120,11 +123,13 @@ def _print(found: RecordingInfo) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from mapmeld.cli.tables import print_lines, print_table, rounded
+    from mapmeld.cli.tables import print_lines, print_table
     from mapmeld.io import printable
+    from mapmeld.wording import rounded
 
     if not found.topics:
-        print_lines("No maps in this recording.")
+        lost = bool(found.left_out)
+        print_lines("No maps could be read from this recording." if lost else "No maps in this recording.")
         return
     table = Table(box=None, padding=(0, 2, 0, 0), header_style="dim", pad_edge=False)
     table.add_column("topic", overflow="fold")

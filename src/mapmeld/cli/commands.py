@@ -60,7 +60,7 @@ class Commands(TyperGroup):
             with _interruption_said():
                 return super().invoke(ctx)
         except MapmeldError as error:
-            say(str(error))
+            say(str(error).replace(" force=True ", " --force "))  # as it is written here
             raise typer.Exit(BAD_INPUT) from error
 
     def main(

@@ -83,7 +83,7 @@ def diff(
     from mapmeld.cli.json_output import as_json, diff_fields
     from mapmeld.cli.maps import load_maps
     from mapmeld.cli.parameters import effective_parameters
-    from mapmeld.cli.placement import given_transform, refuse
+    from mapmeld.cli.placement import given_transform, note_if_unlikely, refuse
     from mapmeld.cli.progress import working
     from mapmeld.cli.tables import print_files, print_lines
 
@@ -93,6 +93,8 @@ def diff(
     started = time.perf_counter()
     with working("Comparing"):
         grid_old, grid_new = load_maps([old, new], resolution)
+        if transform is not None and given is not None:
+            note_if_unlikely(transform, given, grid_old, grid_new)
         try:
             found = diff_maps(
                 grid_old,

@@ -17,14 +17,14 @@ from mapmeld.history import Change, Step
 from mapmeld.io import save
 from mapmeld.io.atomic import write_files
 from mapmeld.io.folders import whole_folder
-from mapmeld.io.history_writer import TIMES
+from mapmeld.io.history_writer import TIMES, state_name
 
 if TYPE_CHECKING:
     from mapmeld.report.film import Film
     from mapmeld.report.rerun_recording import RerunRecording
 
 TRANSFORM, MERGED, SNAPSHOTS = "transform.json", "merged.yaml", "snapshots"
-_OURS = re.compile(rf"{SNAPSHOTS}/(\d{{5,}}\.(yaml|pgm)|{TIMES})")
+_OURS = re.compile(rf"{SNAPSHOTS}/(state_\d{{5,}}\.(yaml|pgm)|{TIMES})")
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +183,7 @@ class Snapshots:
         if merged is None:
             return
         self._folder.mkdir(exist_ok=True)
-        name = f"{step.number:05}.yaml"
+        name = state_name(step.number)
         save(merged, self._folder / name)
         self._times.append(f"{name} {step.number if step.stamp is None else step.stamp!r}")
 

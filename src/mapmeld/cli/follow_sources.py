@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
+from typing import NoReturn
 
 import typer
 
+from mapmeld.cli.maps import same_map
 from mapmeld.grid import OccupancyGrid
 from mapmeld.io.history import read_history
 from mapmeld.io.recordings.address import is_recording, parse_address
@@ -34,6 +36,8 @@ def processes(
                 "is for one recording; of two, name each as RECORDING#topic", param_hint="--topics"
             )
         first, second = sources
+        if same_map(first) == same_map(second):
+            _twice(second, "A [B]")
         return (first, second), (_states_of(first, stack), _states_of(second, stack))
     (source,) = sources
     if not is_recording(source):
@@ -44,8 +48,14 @@ def processes(
     if topic is not None or time is not None:
         raise typer.BadParameter(f"{source} is one map; name a second one", param_hint="A [B]")
     one, two = topics or _two_topics(file)
+    if one == two:
+        _twice(two, "--topics")
     names = f"{file}#{one}", f"{file}#{two}"
     return names, (_recorded(file, one, stack), _recorded(file, two, stack))
+
+
+def _twice(name: str, option: str) -> NoReturn:
+    raise typer.BadParameter(f"{name} is named twice; two robots are needed", param_hint=option)
 
 
 def _states_of(source: str, stack: ExitStack) -> Iterable[OccupancyGrid]:

@@ -16,11 +16,10 @@ from mapmeld.cli.tables import (
     pose_text,
     print_files,
     print_lines,
-    probability_text,
-    rounded,
 )
 from mapmeld.history import Change, Standing, Step
 from mapmeld.io import printable
+from mapmeld.wording import probability_text, rounded
 
 _STYLES = {Standing.ACCEPTED: "green", Standing.WITHDRAWN: "bold red", Standing.UNDECIDED: "yellow"}
 _LOUD = {Change.FOUND: "bold green", Change.LOWERED: "bold yellow", Change.SWITCHED: "bold red"}
@@ -96,11 +95,17 @@ def print_outcome(last: Step | None, files: Sequence[Path]) -> None:
     lines = [""]
     best = None if last is None else last.best
     if last is not None and best is not None and best.T_a_b is not None:
-        lines.append(f"T_1_2        {pose_text(best.T_a_b)}")
-        deviations = deviations_text(best.covariance)
-        lines += [] if deviations is None else [f"std dev      {deviations}"]
+        if last.T_1_2 is not None:
+            lines.append(f"T_1_2        {pose_text(last.T_1_2)}")
+            deviations = deviations_text(best.covariance)
+            lines += [] if deviations is None else [f"std dev      {deviations}"]
         lines.append(f"probability  {probability_text(best.probability)}")
-        lines.append(f"verdict      {last.standing}: {best.reason}")
+        why = (
+            last.why
+            if last.standing is Standing.WITHDRAWN and last.change is Change.WITHDRAWN
+            else best.reason
+        )
+        lines.append(f"verdict      {last.standing}: {why}")
     else:
         lines.append("There was nothing to match.")
     print_lines(*lines)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 import typer
 
 from mapmeld.cli.errors import NO_MATCH, say
-from mapmeld.cli.json_output import MATCH_SCHEMA
+from mapmeld.cli.json_output import FOLLOW_SCHEMA, MATCH_SCHEMA
 
 if TYPE_CHECKING:
     from mapmeld.grid import OccupancyGrid
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mapmeld.se2 import Pose2
 
 _GREATEST = 1e9  # [m]
+_LIKELY = 0.5  # little common wall makes a right transform no more than this probable, too
 
 
 class Placement(NamedTuple):
@@ -43,6 +44,21 @@ def refuse(reason: str) -> NoReturn:
     raise typer.Exit(NO_MATCH)
 
 
+def note_if_unlikely(text: str, T_a_b: Pose2, a: OccupancyGrid, b: OccupancyGrid) -> None:
+    """Say on stderr that the walls do not support a transform that was given; it is used all the same."""
+    from mapmeld.matching.correlative.assess import assess
+    from mapmeld.wording import probability_text
+
+    weighed = assess(a, b, [T_a_b])
+    if weighed.T_a_b is None or (weighed.probability or 0.0) >= _LIKELY:
+        return  # nothing to say, or nothing to object to
+    probability = probability_text(weighed.probability)
+    say(
+        f"note: the walls do not support --transform {text} (probability {probability}: {weighed.reason}); "
+        "used as given"
+    )
+
+
 def given_transform(text: str, a: str, b: str) -> Pose2:
     """Return what ``--transform`` says of how map b lies on map a, T_a_b.
 
@@ -50,7 +66,7 @@ def given_transform(text: str, a: str, b: str) -> Pose2:
     ----------
     text
         "x,y,degrees", or the name of a ``.json`` file with the answer of ``mapmeld match --json`` for the
-        two maps, in either order.
+        two maps, in either order, or the ``transform.json`` of ``mapmeld follow`` for histories with them.
     a, b
         The maps as they were named.
 
@@ -89,8 +105,16 @@ def _from_file(path: str, a: str, b: str) -> Pose2:
     from mapmeld.se2 import Pose2
 
     content = read_object(path)
-    if content.get("schema") != MATCH_SCHEMA:
-        raise MapFileError.of(path, f"is not the answer of 'mapmeld match --json' (schema {MATCH_SCHEMA})")
+    if content.get("schema") == FOLLOW_SCHEMA:
+        content = _as_of_match(content)
+        if not _of_recordings(content):  # a process is a folder of maps
+            a, b = (os.path.dirname(name) or "." for name in (a, b))  # noqa: PTH120  (texts as given)
+    elif content.get("schema") != MATCH_SCHEMA:
+        raise MapFileError.of(
+            path,
+            f"is neither the answer of 'mapmeld match --json' (schema {MATCH_SCHEMA}) nor the transform.json "
+            "of 'mapmeld follow'",
+        )
     maps = _texts(content.get("maps"), ("a", "b"))
     if maps is None:
         raise MapFileError.of(path, "does not say which maps were matched")
@@ -108,6 +132,24 @@ def _from_file(path: str, a: str, b: str) -> Pose2:
         raise MapFileError.of(path, "its T_a_b is not x, y and theta")
     T = Pose2(*map(float, numbers))
     return T.inverse() if swapped else T
+
+
+def _as_of_match(outcome: dict[str, Any]) -> dict[str, Any]:
+    """Return the outcome of ``mapmeld follow`` as if its two processes were two maps."""
+    processes, best = outcome.get("processes"), outcome.get("best")
+    named = processes if isinstance(processes, dict) else {}
+    return {
+        "maps": {"a": named.get("1"), "b": named.get("2")},
+        "verdict": outcome.get("standing"),
+        "reason": best.get("reason") if isinstance(best, dict) else "there was nothing to match",
+        "T_a_b": outcome.get("T_1_2"),
+    }
+
+
+def _of_recordings(content: dict[str, Any]) -> bool:
+    from mapmeld.io.recordings.address import is_recording
+
+    return all(isinstance(name, str) and is_recording(name) for name in content["maps"].values())
 
 
 def _is_number(value: Any) -> bool:

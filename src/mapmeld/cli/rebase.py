@@ -46,7 +46,7 @@ def rebase(
     from mapmeld.cli.json_output import as_json, rebase_fields
     from mapmeld.cli.maps import check_map_path, exact_mode, load_maps
     from mapmeld.cli.parameters import effective_parameters
-    from mapmeld.cli.placement import Placement, accepted_match, given_transform
+    from mapmeld.cli.placement import Placement, accepted_match, given_transform, note_if_unlikely
     from mapmeld.cli.progress import working
     from mapmeld.cli.tables import pose_text, print_files, print_lines
     from mapmeld.io import save
@@ -56,6 +56,8 @@ def rebase(
     given = None if transform is None else given_transform(transform, onto, new)
     with working("Laying down"):
         old_grid, new_grid = load_maps([onto, new], resolution)
+        if transform is not None and given is not None:
+            note_if_unlikely(transform, given, old_grid, new_grid)
         placed = (
             accepted_match(old_grid, new_grid, method, parameters)
             if given is None

@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from mapmeld.io import printable
+from mapmeld.wording import probability_text, rounded
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,28 +34,12 @@ def console() -> Console:
     return Console(highlight=False, width=None if sys.stdout.isatty() else 110)
 
 
-def rounded(value: float, digits: int) -> str:
-    """Return a number in plain digits, never as -0.000."""
-    return f"{round(value, digits) + 0.0:.{digits}f}"
-
-
 def pose_text(pose: Pose2 | None) -> str:
     """Return a transform or pose in metres and degrees."""
     if pose is None:
         return "-"
     x, y = rounded(pose.x, 3), rounded(pose.y, 3)
     return f"x {x} m, y {y} m, theta {rounded(math.degrees(pose.theta), 2)} deg"
-
-
-def probability_text(probability: float | None) -> str:
-    """Return a probability with three digits, which never look like certainty where there is none."""
-    if probability is None:
-        return "-"
-    if 0.9995 <= probability < 1:
-        return "> 0.999"
-    if 0 < probability < 0.0005:
-        return "< 0.001"
-    return rounded(probability, 3)
 
 
 def deviations_text(covariance: NDArray[np.float64] | None) -> str | None:

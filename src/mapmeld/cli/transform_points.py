@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -54,19 +55,30 @@ def transform_points(
     from mapmeld.cli.json_output import as_json, transform_points_fields
     from mapmeld.cli.maps import load_maps
     from mapmeld.cli.parameters import effective_parameters
-    from mapmeld.cli.placement import Placement, accepted_match, given_transform, transform_of_numbers
+    from mapmeld.cli.placement import (
+        Placement,
+        accepted_match,
+        given_transform,
+        note_if_unlikely,
+        transform_of_numbers,
+    )
     from mapmeld.cli.progress import working
     from mapmeld.cli.tables import pose_text, print_lines
+    from mapmeld.io import MapFileError
     from mapmeld.io.atomic import check_targets, write_files
 
     _check_usage(from_map, to_map, transform)
-    carry = _reader(points, out)
+    carry = _reader(points, out, to_map)
     check_targets([out], force=force)
     parameters = effective_parameters(method, params, settings)
     if from_map is None or to_map is None:
         placed = Placement(transform_of_numbers(transform or ""), None)
     elif transform is not None:
         placed = Placement(given_transform(transform, to_map, from_map), None)
+        # Only their names are needed, so they may be elsewhere.
+        with working("Weighing"), suppress(MapFileError):
+            grid_to, grid_from = load_maps([to_map, from_map], resolution)
+            note_if_unlikely(transform, placed.T_a_b, grid_to, grid_from)
     else:
         with working("Matching"):
             grid_to, grid_from = load_maps([to_map, from_map], resolution)
@@ -90,9 +102,10 @@ def _check_usage(from_map: str | None, to_map: str | None, transform: str | None
         raise typer.BadParameter("needs the names of both maps, --from A --to B", param_hint=hint)
 
 
-def _reader(points: Path, out: Path) -> Callable[[Pose2], tuple[str, dict[str, int]]]:
+def _reader(points: Path, out: Path, to_map: str | None) -> Callable[[Pose2], tuple[str, dict[str, int]]]:
     """Read the points now, so that nothing is matched for a bad file; return what carries them over."""
     from mapmeld.changes import geojson, places
+    from mapmeld.cli.maps import names_of
     from mapmeld.io import MapFileError
     from mapmeld.io.plain_json import read_object
     from mapmeld.se2 import Pose2
@@ -112,7 +125,8 @@ def _reader(points: Path, out: Path) -> Callable[[Pose2], tuple[str, dict[str, i
         counts = {"positions": geojson.position_count(geojson.moved_geojson(content, Pose2()))}
     except geojson.GeoJsonError as error:
         raise MapFileError.of(points, str(error)) from None
-    return lambda T: (geojson.geojson_text(geojson.moved_geojson(content, T)), counts)
+    to = () if to_map is None else names_of([to_map])
+    return lambda T: (geojson.geojson_text(geojson.moved_geojson(content, T, *to)), counts)
 
 
 def _counted(count: dict[str, int]) -> str:

@@ -29,7 +29,9 @@ def check_targets(paths: Sequence[AnyPath], *, force: bool) -> None:
             if not os.path.lexists(path):
                 continue
             if not force:
-                raise MapFileError.of(path, "exists already; choose another name, or force to replace it")
+                raise MapFileError.of(
+                    path, "exists already; choose another name, or force=True to replace it"
+                )
             if path.exists() and not stat.S_ISREG(path.stat().st_mode):
                 raise MapFileError.of(path, "exists and is not a plain file, so it is not replaced")
 
@@ -105,7 +107,9 @@ def _explained(path: Path) -> Iterator[None]:
     try:
         yield
     except FileExistsError:
-        raise MapFileError.of(path, "exists already; choose another name, or force to replace it") from None
+        raise MapFileError.of(
+            path, "exists already; choose another name, or force=True to replace it"
+        ) from None
     except OSError as error:
         raise MapFileError.of(path, f"cannot be written: {error.strerror or error}") from error
     except ValueError as error:  # a null character in the name

@@ -31,7 +31,9 @@ def check_folder(folder: Path, *, force: bool) -> None:
         elif not folder.is_dir():
             raise FolderError(f"{folder}: exists and is not a folder")
         elif not force and any(True for _ in folder.iterdir()):
-            raise FolderError(f"{folder}: is not empty; choose another folder, or --force to write into it")
+            raise FolderError(
+                f"{folder}: is not empty; choose another folder, or force=True to write into it"
+            )
     except OSError as error:
         raise FolderError(f"{folder}: cannot be written: {error.strerror}") from error
 
@@ -93,7 +95,9 @@ def whole_folder(folder: Path, *, force: bool, ours: Collection[str]) -> Iterato
 def _move_into(temporary: Path, folder: Path, force: bool, ours: Collection[str]) -> None:
     others = [path for path in folder.iterdir() if path != temporary]
     if others and not force:
-        raise FolderError(f"{folder}: is not empty any more; choose another folder, or --force")
+        raise FolderError(
+            f"{folder}: is not empty any more; choose another folder, or force=True to write into it"
+        )
     written = sorted(path.relative_to(temporary) for path in temporary.rglob("*") if path.is_file())
     for path in written:
         if (folder / path).is_dir():

@@ -3,8 +3,8 @@
 The time of a state [s] is its name (``00080.yaml``, ``12.345.yaml``), or stands in a file ``times.txt``:
 
     # a state and its time [s], one a line
-    00000.yaml 0.0
-    00001.yaml 5.5
+    state_00000.yaml 0.0
+    state_00001.yaml 5.5
 
 There a state may be named without its ending too, or by its number alone. Where there is a
 ``times.txt``, only the maps that it names are states.

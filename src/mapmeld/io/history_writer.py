@@ -16,7 +16,7 @@ from mapmeld.io.folders import whole_folder
 from mapmeld.io.map_server import write_map
 
 TIMES = "times.txt"
-_OURS = re.compile(r"\d{5,}\.(yaml|pgm)|times\.txt")
+_OURS = re.compile(r"state_\d{5,}\.(yaml|pgm)|times\.txt")
 
 
 def write_history(
@@ -24,8 +24,9 @@ def write_history(
 ) -> tuple[Path, ...]:
     """Write the states of a map into a folder, which appears whole or not at all.
 
-    The maps are ``00000.yaml``, ``00001.yaml`` and so on, each with its image, and keep every percentage: in
-    mode "trinary" where there is nothing but free, occupied and unknown, else in mode "raw". Each line
+    The maps are ``state_00000.yaml``, ``state_00001.yaml`` and so on, which nobody can take for
+    times, each with its image, and keep every percentage: in mode
+    "trinary" where there is nothing but free, occupied and unknown, else in mode "raw". Each line
     of ``times.txt`` is the name of a map and its stamp in seconds; lines that begin with # are comments.
     The frames, for which neither file has a place, are named there.
 
@@ -62,7 +63,7 @@ def write_history(
             if grid.frame_id != frame:
                 frame = grid.frame_id
                 lines.append(f"# frame_id: {printable(frame)}")
-            name = f"{number:05}.yaml"
+            name = state_name(number)
             lossless = bool(np.isin(grid.cells, (UNKNOWN, FREE, OCCUPIED)).all())
             write_map(grid, temporary / name, mode="trinary" if lossless else "raw")
             lines.append(f"{name} {float(grid.stamp)!r}")
@@ -71,6 +72,11 @@ def write_history(
             raise MapFileError.of(folder, "there is no map to write")
         write_files([(temporary / TIMES, ["\n".join([*lines, ""]).encode()])])
     return tuple(target / name for name in names)
+
+
+def state_name(number: int) -> str:
+    """Return the name of a state's file: one that is no time, should the list of times get lost."""
+    return f"state_{number:05}.yaml"
 
 
 def _names_in(folder: Path) -> list[str]:

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from mapmeld.grid import Cells, OccupancyGrid, resample
-from mapmeld.history.step import Step
+from mapmeld.history.step import Change, Step, Work
 from mapmeld.io.atomic import check_targets, write_files
 from mapmeld.merging.aligned import lattice_for_all
 from mapmeld.report.canvas import Picture, Window, paint, whole_scale
@@ -20,40 +20,81 @@ from mapmeld.report.palette import BLUE, FLOOR_WHITE, GREEN, PAPER, RED, UNKNOWN
 from mapmeld.report.png import PictureError
 from mapmeld.report.sheet import Panel, compose
 from mapmeld.se2 import Pose2
+from mapmeld.wording import probability_text, rounded
 
 FRAMES = 48  # of an animation, at most
 STRIP_FRAMES = 6
+TURNS = STRIP_FRAMES - 2  # beside the first and the last
 FRAME_MS, LAST_MS = 300, 2500
 _NO_DITHER = 3  # there are few colours, none of which shall be mixed from others
 _STRIP_PX, _GIF_PX = 320, 400  # long side of a panel that is aimed at
+_NARROWEST = 200  # [px] of a panel: room for the longest word below it
+_TURNING = (Change.FOUND, Change.SWITCHED, Change.WITHDRAWN)
 _LEGEND = [(RED, "walls of map 1"), (BLUE, "walls of map 2"), (GREEN, "walls in both")]
 
 
 class Film:
-    """Steps to draw, in order; of many it keeps some, evenly spread, so that memory stays bounded."""
+    """Steps to draw, in order; of many it keeps some, evenly spread, so that memory stays bounded.
+
+    Where a match was found, switched or withdrawn is kept besides: the first such step and the newest ones.
+
+    Attributes
+    ----------
+    begin
+        Time of the first state of either process [s], from which times count; None without stamps.
+    """
 
     def __init__(self) -> None:
-        self._kept: list[Step] = []
+        self.begin: float | None = None
+        self._kept: list[tuple[int, Step]] = []
         self._every = 1
+        self._count = 0
+        self._turns: list[Step] = []
         self._last: Step | None = None
 
     def take(self, step: Step) -> None:
-        """Take the next step; those without both maps have nothing to draw."""
-        if None in step.maps:
+        """Take the next step; those without both maps, or with maps as they were, have nothing to draw."""
+        self.begin = step.stamp if self.begin is None else self.begin
+        as_it_was = self._last is not None and step.work is Work.NOTHING
+        if None in step.maps or as_it_was:
             return
         self._last = step
-        if step.number % self._every:
+        if step.change in _TURNING:
+            self._turns.append(step)
+            if len(self._turns) > TURNS:
+                del self._turns[1]
+        self._count += 1
+        if self._count % self._every:
             return
-        self._kept.append(step)
+        self._kept.append((self._count, step))
         if len(self._kept) > FRAMES:
             self._every *= 2
-            self._kept = [kept for kept in self._kept if kept.number % self._every == 0]
+            self._kept = [kept for kept in self._kept if kept[0] % self._every == 0]
 
     def steps(self) -> list[Step]:
         """Return what is kept, with the last step in any case."""
-        if self._last is None or (self._kept and self._kept[-1] is self._last):
-            return self._kept
-        return [*self._kept, self._last]
+        last = [] if self._last is None else [self._last]
+        kept = {step.number: step for step in (*(step for _, step in self._kept), *self._turns, *last)}
+        return [kept[number] for number in sorted(kept)]
+
+    def moments(self) -> list[Step]:
+        """Return a few steps for a strip: first, last, what the match went through, and some between."""
+        steps = self.steps()
+        if len(steps) <= STRIP_FRAMES:
+            return steps
+        chosen = {step.number: step for step in (steps[0], steps[-1], *self._turns)}
+        while len(chosen) < STRIP_FRAMES:  # each where the gap is widest
+            rest = [step for step in steps if step.number not in chosen]
+            farthest = max(rest, key=lambda step: min(_apart(step, other) for other in chosen.values()))
+            chosen[farthest.number] = farthest
+        return [chosen[number] for number in sorted(chosen)]
+
+
+def _apart(one: Step, other: Step) -> float:
+    """Return how far apart two steps are: in time, or in states where there are no times."""
+    if one.stamp is None or other.stamp is None:
+        return abs(one.number - other.number)
+    return abs(one.stamp - other.stamp)
 
 
 def strip(film: Film) -> Picture:
@@ -64,9 +105,7 @@ def strip(film: Film) -> Picture:
     PictureError
         There was never a map of both.
     """
-    steps = film.steps()
-    chosen = sorted({round(k) for k in np.linspace(0, len(steps) - 1, STRIP_FRAMES)}) if steps else []
-    scenes = _scenes([steps[k] for k in chosen], _STRIP_PX)
+    scenes = _scenes(film.moments(), film.begin, _STRIP_PX)
     caption = "Above: the frame of map 1; map 2 lies in it while the match is accepted. Below: map 2 alone."
     return compose([Panel(_below(scene), scene.text) for scene in scenes], caption, _LEGEND)
 
@@ -80,8 +119,12 @@ def frames(film: Film) -> list[Picture]:
         There was never a map of both.
     """
     pictures = [
-        compose([Panel(scene.merge, "the frame of map 1"), Panel(scene.second, "map 2")], scene.text, _LEGEND)
-        for scene in _scenes(film.steps(), _GIF_PX)
+        compose(
+            [Panel(_roomy(scene.merge), "the frame of map 1"), Panel(_roomy(scene.second), "map 2")],
+            scene.text,
+            _LEGEND,
+        )
+        for scene in _scenes(film.steps(), film.begin, _GIF_PX)
     ]
     height = max(len(picture) for picture in pictures)
     return [_padded(picture, height) for picture in pictures]
@@ -139,8 +182,8 @@ class _Scene:
     text: str
 
 
-def _scenes(steps: Sequence[Step], long_side_px: int) -> list[_Scene]:
-    """Draw steps in windows that all of them share."""
+def _scenes(steps: Sequence[Step], begin: float | None, long_side_px: int) -> list[_Scene]:
+    """Draw steps in windows that all of them share; their times count from `begin` [s]."""
     pairs = [(step, *_both(step)) for step in steps]
     if not pairs:
         raise PictureError("nothing to draw: there was never a map of both processes")
@@ -148,7 +191,6 @@ def _scenes(steps: Sequence[Step], long_side_px: int) -> list[_Scene]:
     seconds = _layers([[(second, Pose2())] for _, _, second in pairs])
     windows = [_window(drawn) for drawn in (merges, seconds)]
     scale = whole_scale(max(max(window.rows, window.cols) for window in windows), long_side_px)
-    begin = next((step.stamp for step, *_ in pairs if step.stamp is not None), None)
     return [
         _Scene(
             merge=_painted(merge, RED, windows[0], scale),
@@ -186,16 +228,25 @@ def _painted(layers: Sequence[Cells], colour: Colour, window: Window, scale: flo
 
 
 def _text(step: Step, begin: float | None) -> str:
-    when = f"state {step.number}" if step.stamp is None or begin is None else f"{step.stamp - begin:.1f} s"
-    probability = None if step.best is None else step.best.probability
-    return f"{when}: {step.standing}" + ("" if probability is None else f", {probability:.2f}")
+    when = f"state {step.number}"
+    if step.stamp is not None and begin is not None:
+        when = f"{rounded(step.stamp - begin, 1)} s"
+    found = step.best if step.best is not None and step.best.T_a_b is not None else None
+    if found is None or found.probability is None:
+        return f"{when}: {step.standing}"
+    words = probability_text(found.probability)
+    return f"{when}: {step.standing}, p " + (words if words[0] in "<>" else f"= {words}")
 
 
 def _below(scene: _Scene) -> Picture:
     """Return map 2 below the merge."""
-    width = max(scene.merge.shape[1], scene.second.shape[1])
+    width = max(scene.merge.shape[1], scene.second.shape[1], _NARROWEST)
     gap = np.full((6, width, 3), PAPER, np.uint8)
     return np.concatenate([_widened(scene.merge, width), gap, _widened(scene.second, width)])
+
+
+def _roomy(picture: Picture) -> Picture:
+    return _widened(picture, max(picture.shape[1], _NARROWEST))
 
 
 def _widened(picture: Picture, width: int) -> Picture:

@@ -34,15 +34,15 @@ def draw_text(
     cv2.putText(picture, plain(text), base_left, _FONT, scale, colour, 2 if bold else 1, cv2.LINE_AA)
 
 
-def wrapped(text: str, scale: float, width_px: int) -> list[str]:
+def wrapped(text: str, scale: float, width_px: int, *, bold: bool = False) -> list[str]:
     """Break a text between words into lines that fit; a word that does not fit is cut in the middle."""
     lines: list[str] = []
     for word in text.split():
         longer = f"{lines[-1]} {word}" if lines else word
-        if lines and text_size(longer, scale)[0] <= width_px:
+        if lines and text_size(longer, scale, bold=bold)[0] <= width_px:
             lines[-1] = longer
         else:
-            lines.append(shortened(word, scale, width_px))
+            lines.append(shortened(word, scale, width_px, bold=bold))
     return lines
 
 

@@ -69,7 +69,18 @@ def _arranged(panels: Sequence[Panel]) -> Picture:
     in_row = abs(math.log(beside / _LANDSCAPE)) <= abs(math.log(below / _LANDSCAPE))
     scale = 0.5 * min(max((sizes[:, 1].sum() if in_row else sizes[:, 1].max()) / 1000, 1.0), 1.6)
     tallest = int(sizes[:, 0].max())
-    framed = [_framed(panel, scale, tallest if in_row else panel.picture.shape[0]) for panel in panels]
+    names = [wrapped(panel.name, scale, panel.picture.shape[1], bold=True) for panel in panels]
+    most = max(map(len, names))
+    framed = [
+        _framed(
+            panel.picture,
+            lines,
+            scale,
+            tallest if in_row else panel.picture.shape[0],
+            most if in_row else len(lines),
+        )
+        for panel, lines in zip(panels, names, strict=True)
+    ]
     width = max(f.shape[1] for f in framed)
     parts: list[Picture] = []
     for f in framed:
@@ -85,23 +96,17 @@ def _blank(height: int, width: int) -> Picture:
     return blank
 
 
-def _framed(panel: Panel, scale: float, height: int) -> Picture:
-    """Return a panel in a frame, centred in the height that all have, with its name at the bottom."""
-    own_height, width = panel.picture.shape[:2]
-    name_height = round(44 * scale) if panel.name else 0
-    framed = _blank(height + 2 + name_height, width + 2)
+def _framed(picture: Picture, name: Sequence[str], scale: float, height: int, lines: int) -> Picture:
+    """Return a picture in a frame, centred in the height that all have, with its name in lines below."""
+    own_height, width = picture.shape[:2]
+    line_height = round(44 * scale)
+    framed = _blank(height + 2 + lines * line_height, width + 2)
     top = (height - own_height) // 2
-    framed[top + 1 : top + own_height + 1, 1 : width + 1] = panel.picture
+    framed[top + 1 : top + own_height + 1, 1 : width + 1] = picture
     cv2.rectangle(framed, (0, top), (width + 1, top + own_height + 1), FRAME, 1)
-    if panel.name:
-        draw_text(
-            framed,
-            shortened(panel.name, scale, width, bold=True),
-            (2, height + 2 + round(0.75 * name_height)),
-            scale,
-            INK,
-            bold=True,
-        )
+    for number, line in enumerate(name):
+        base = height + 2 + round((number + 0.75) * line_height)
+        draw_text(framed, line, (2, base), scale, INK, bold=True)
     return framed
 
 

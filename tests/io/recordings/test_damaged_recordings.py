@@ -19,6 +19,7 @@ from bag_files import FORMATS, Sent, mcap_bytes, sent_map, sent_text, story, wri
 from mapmeld.errors import MapmeldError
 from mapmeld.grid import OccupancyGrid
 from mapmeld.io.recordings import RecordingError, map_states, recording_info
+from mapmeld.io.recordings.source import reason_of
 
 TOPIC = "/robot_1/map"
 
@@ -225,7 +226,7 @@ def test_a_file_that_is_missing_or_of_an_unknown_kind(tmp_path: Path) -> None:
     metadata = path / "metadata.yaml"
     text = metadata.read_text()
     metadata.write_text(text.replace("storage_identifier: sqlite3", "storage_identifier: magnetic_tape"))
-    with pytest.raises(RecordingError, match=r"Storage plugin 'magnetic_tape' not supported\)"):
+    with pytest.raises(RecordingError, match=r"Storage plugin 'magnetic_tape' not supported"):
         map_states(path, TOPIC)
     metadata.write_text(text)
     (path / "run.db3").unlink()
@@ -308,3 +309,39 @@ def test_chunks_that_are_much_larger_than_they_say(tmp_path: Path, compression: 
         map_states(path)
     with pytest.raises(RecordingError):
         map_states(path, damaged="use")
+
+
+# ---------------------------------------------------------------- what is said
+def without_the_first_chunk(tmp_path: Path) -> Path:
+    """All maps of a topic in one chunk that is damaged, those of another in the next."""
+    maps = [sent_map(n, np.full((60, 60), n), TOPIC) for n in range(3)]
+    others = [sent_map(10 + n, np.full((60, 60), n), "/robot_2/map") for n in range(30)]
+    none = import_module("mcap.writer").CompressionType.NONE
+    path = write_mcap(tmp_path, [*maps, *others], chunk_size=10_000, compression=none)
+    data = bytearray(path.read_bytes())
+    at = data.index(b"\x01" * 400)
+    data[at : at + 30] = b"\x55" * 30
+    path.write_bytes(data)
+    return path
+
+
+def test_maps_that_were_all_in_a_damaged_chunk_are_said_to_be_lost(tmp_path: Path) -> None:
+    path = without_the_first_chunk(tmp_path)
+    with pytest.raises(RecordingError, match=r"has no maps; .*damaged and left out: a chunk that is damaged"):
+        map_states(path, TOPIC, damaged="use")
+    states = map_states(path, "/robot_2/map", damaged="use")
+    assert list(states)
+    assert states.damage == states.left_out
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (EOFError(), "it is cut off, its end is missing [EOFError]"),
+        (ValueError("unpack requires a buffer of 8 bytes"), "it is cut off, its end is missing [unpack"),
+        (ValueError("unknown (opcode 158) record has length 9"), "a part is damaged [unknown (opcode 158)"),
+        (ValueError("Bag is not indexed."), "Bag is not indexed"),
+    ],
+)
+def test_damage_in_words(error: Exception, said: str) -> None:
+    assert reason_of(error).startswith(said)

@@ -30,6 +30,7 @@ class _Joined:
         self.channels = tuple(dict.fromkeys(channel for source in sources for channel in source.channels))
         self.start = min((source.start for source in sources if source.start is not None), default=None)
         self.left_out: Counter[str] = Counter()
+        self.damage = sum((source.damage for source in sources), Counter[str]())
 
     def messages(self, wanted: Collection[Channel]) -> Iterator[Message]:
         """Give the messages of some channels."""
@@ -62,7 +63,8 @@ def folder_scan(path: str) -> Iterator[Source]:
         if not sources:
             raise RecordingError.of(path, "holds neither a .db3 nor an .mcap file")
         joined = _Joined(sources)
-        joined.left_out.update(f"a whole file: {error}" for error in failed)
+        for left_out in (joined.left_out, joined.damage):
+            left_out.update(f"a whole file: {error}" for error in failed)
         yield joined
 
 

@@ -53,6 +53,7 @@ class _IndexedSource:
         starts = [index.message_start_time for index in summary.chunk_indexes if index.message_index_length]
         self.start: int | None = min(starts, default=None)
         self.left_out: Counter[str] = Counter()
+        self.damage: Counter[str] = Counter()
 
     def messages(self, wanted: Collection[Channel]) -> Iterator[Message]:
         """Give the messages of some channels."""

@@ -22,6 +22,7 @@ class RosbagsSource:
         self.channels = tuple(dict.fromkeys(map(_channel_of, reader.connections)))
         self.start: int | None = reader.start_time if reader.message_count else None
         self.left_out: Counter[str] = Counter()
+        self.damage: Counter[str] = Counter()
 
     def messages(self, wanted: Collection[Channel]) -> Iterator[Message]:
         """Give the messages of some channels."""

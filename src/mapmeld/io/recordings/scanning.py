@@ -39,12 +39,13 @@ class ScannedSource:
         self._scan = scan
         self._strict = strict
         self.left_out: Counter[str] = Counter()
+        self.damage: Counter[str] = Counter()
         channels: dict[Channel, None] = {}
         self.start: int | None = None
         if not strict:
             for _ in scan(_ignore):
                 pass
-        for channel, received, _ in scan(self._refuse if strict else _ignore):
+        for channel, received, _ in scan(self._refuse if strict else self._look_at):
             channels[channel] = None
             self.start = received if self.start is None else min(self.start, received)
         self.channels = tuple(channels)
@@ -66,6 +67,9 @@ class ScannedSource:
 
     def _refuse(self, reason: str) -> None:
         raise damaged(self._path, reason)
+
+    def _look_at(self, reason: str) -> None:
+        self.damage[reason] += 1
 
     def _note(self, reason: str) -> None:
         self.left_out[reason] += 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -38,11 +39,14 @@ class Source(Protocol):
         When the first message of any channel was received [ns]; None if there is none.
     left_out
         What could not be read and was passed over, and how often; grows while messages are read.
+    damage
+        What will be passed over in any case, whichever channels are read.
     """
 
     channels: tuple[Channel, ...]
     start: int | None
     left_out: Counter[str]
+    damage: Counter[str]
 
     def messages(self, wanted: Collection[Channel]) -> Iterator[Message]:
         """Give the messages of some channels as they were received, reading as it goes."""
@@ -80,8 +84,18 @@ def damaged(path: str, reason: str) -> RecordingError:
     )
 
 
+# How the libraries say that there are fewer bytes than there should be, or others.
+_CUT_OFF = re.compile(
+    r"EndOfFile|unpack(_from)? requires|end of (the )?file|EOF|too short|truncated", re.IGNORECASE
+)
+_GARBLED = re.compile(r"opcode|crc|checksum|malformed|codec can't|out of range|invalid", re.IGNORECASE)
+
+
 def reason_of(error: Exception) -> str:
     """Return what a library says of damage, short and on one line."""
     text = " ".join(str(error).split()).rstrip(".").removesuffix("; please report issue")
     text = text or type(error).__name__
-    return text if len(text) <= 120 else text[:117] + "..."
+    text = text if len(text) <= 120 else text[:117] + "..."
+    if _CUT_OFF.search(text):
+        return f"it is cut off, its end is missing [{text}]"
+    return f"a part is damaged [{text}]" if _GARBLED.search(text) else text

@@ -48,13 +48,16 @@ class MapStates(Iterator[OccupancyGrid]):
     left_out
         What was passed over so far, and how often: updates that fit no map, and what is damaged where
         that may be.
+    damage
+        What of the recording is passed over whichever map is read, so that it counts once for several.
     """
 
     topic: str
     left_out: Counter[str]
+    damage: Counter[str]
 
     def __init__(self, path: AnyPath, topic: str | None, damaged: Damaged) -> None:
-        self.left_out = Counter()
+        self.left_out, self.damage = Counter(), Counter()
         self._states = self._opened(os.fsdecode(path), topic, damaged)
         next(self._states)  # as far as the topic is found, so that a wrong one is told at once
 
@@ -77,6 +80,7 @@ class MapStates(Iterator[OccupancyGrid]):
             channels = _channels(path, source, topic)
             self.topic = channels[0].topic
             self.left_out = source.left_out
+            self.damage = source.damage
             yield None
             yield from self._read(path, source, channels, damaged)
 
@@ -213,13 +217,15 @@ def _channels(path: str, source: Source, topic: str | None) -> list[Channel]:
                 path, f"has maps on {len(names)} topics; name one of them: {_listed(names)}"
             )
         if not names:
-            raise RecordingError.of(path, f"has no topic with maps{_unreadable(source)}")
+            raise RecordingError.of(path, f"has no topic with maps{_unreadable(source)}{_lost(source)}")
         name = names[0]
     else:
         name = next((n for n in (topic, f"/{topic}", topic.removeprefix("/")) if n in names), "")
         if not name:
             there = f"there are: {_listed(names)}" if names else "nor has any other"
-            raise RecordingError.of(path, f"topic {topic} has no maps; {there}{_unreadable(source)}")
+            raise RecordingError.of(
+                path, f"topic {topic} has no maps; {there}{_unreadable(source)}{_lost(source)}"
+            )
     updates = [
         channel
         for channel in source.channels
@@ -231,6 +237,12 @@ def _channels(path: str, source: Source, topic: str | None) -> list[Channel]:
 def _listed(names: list[str]) -> str:
     more = f" and {len(names) - 10} more" if len(names) > 10 else ""
     return ", ".join(names[:10]) + more
+
+
+def _lost(source: Source) -> str:
+    """Say that maps may have been in what is damaged."""
+    lost = "; ".join(sorted(source.damage)[:2])
+    return f"; they may have been in what is damaged and left out: {lost}" if lost else ""
 
 
 def _unreadable(source: Source) -> str:
