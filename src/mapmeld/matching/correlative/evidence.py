@@ -82,6 +82,11 @@ class Evidence:
         return math.sqrt(max(0.0, nats * self.wall))
 
     @property
+    def per_metre(self) -> float:
+        """Deviance [nats] that a metre of wall has from a random placement."""
+        return max(self.surplus**2 / self.wall, 1e-9)
+
+    @property
     def clean(self) -> float:
         """How little wall lies in the other's free space, as a logarithm: 0 (all of it) .. 3.9 (none)."""
         return -math.log(self.contra / self.wall + 0.02)

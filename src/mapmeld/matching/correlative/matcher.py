@@ -30,6 +30,9 @@ RIVAL_SCORE = 0.0  # even odds if the mode stood alone
 RIVAL_EXPLAINS = 0.95  # of the share of walls that the best mode explains
 RIVAL_CONTRADICTED = 0.01  # more, as a share of the walls, than in the best mode
 RIVAL_CLEAN = 0.05  # share of the walls contradicted from which the maps themselves tell against it
+REPEAT_SCORE = 2.0  # from which, standing alone, a mode shows that the place may repeat itself
+REPEAT_WALL = 0.7  # of the best mode's tested wall that it must have had tested too
+REPEAT_SLOPE = 10.0  # score that it falls behind, by the share by which a metre of its wall tells less
 FIXED_LEAST = 4.0  # [m] of wall that must fix every direction
 WALL_LEAST = 36.0  # [m] of wall of both maps in the overlap; rooms that look alike can have less in common
 AT_ODDS = 0.09, 0.13  # shares of wall explained as it lies x contradicted: doubtful from, impossible from
@@ -198,8 +201,19 @@ def _level_rivals(modes: Sequence[Mode], scores: Doubles) -> list[float]:
             and its_explained >= RIVAL_EXPLAINS * explained
             and its_contradicted <= min(contradicted + RIVAL_CONTRADICTED, RIVAL_CLEAN)
         )
-        levelled.append(best if rival else min(score, best))
+        levelled.append(best if rival else max(min(score, best), best - _behind(mode, modes[0])))
     return levelled
+
+
+def _behind(mode: Mode, best: Mode) -> float:
+    """How far a mode falls behind the best if what counts is the metre of wall, not how many there are.
+
+    In a place that repeats itself the best mode may only have more of the same. Infinite for modes that
+    do not show this: unlikely ones, or with less wall tested.
+    """
+    if mode.score <= REPEAT_SCORE or mode.evidence.wall < REPEAT_WALL * best.evidence.wall:
+        return math.inf
+    return REPEAT_SLOPE * max(0.0, 1 - mode.evidence.per_metre / best.evidence.per_metre)
 
 
 # ---------------------------------------------------------------------- the answer

@@ -63,5 +63,6 @@ def fitted_model() -> ProbabilityModel:
 def surplus_of_others(modes: Sequence[Evidence], looked_at: int) -> Doubles:
     """Return for each mode the mean surplus of the others; those missing of `looked_at` count as usual."""
     surplus = np.array([mode.surplus for mode in modes])
-    missing = max(0, looked_at - len(modes)) * USUAL_SURPLUS
-    return np.asarray((surplus.sum() - surplus + missing) / (looked_at - 1))
+    count = max(looked_at, len(modes))
+    missing = (count - len(modes)) * USUAL_SURPLUS
+    return np.asarray((surplus.sum() - surplus + missing) / (count - 1))
