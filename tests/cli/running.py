@@ -68,8 +68,3 @@ def write_maps(folder: Path, *names: str) -> list[Path]:
     for name in names:
         save(_grids()[name], folder / f"{name}.yaml")
     return [folder / f"{name}.yaml" for name in names]
-
-
-def contents(folder: Path) -> set[str]:
-    """Every file below a folder, hidden ones too."""
-    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}

@@ -7,7 +7,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from running import contents, run, run_for_real
+from listing import contents
+from running import run, run_for_real
 
 import mapmeld
 from mapmeld.io.recordings import map_states

@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 import yaml
-from running import Outcome, contents, run, run_for_real
+from listing import contents
+from running import Outcome, run, run_for_real
 from tiny_dataset import T_1_2, pair, write_dataset, write_pairs
 
 from mapmeld.evaluation import Trial, TrialRow, run_trials

@@ -2,7 +2,8 @@ import json
 from pathlib import Path
 
 import pytest
-from running import contents, run, run_for_real
+from listing import contents
+from running import run, run_for_real
 
 import mapmeld
 from mapmeld.cli.example_maps import ExamplesError, example_map

@@ -4,7 +4,8 @@ from pathlib import Path
 import cv2
 import pytest
 from changed_maps import CAME, WENT, write_old_and_new
-from running import T_A_B, contents, run, write_maps
+from listing import contents
+from running import T_A_B, run, write_maps
 
 import mapmeld
 from mapmeld.cli.diff import OURS

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import cv2
 import pytest
-from running import contents, run, run_for_real, write_maps
+from listing import contents
+from running import run, run_for_real, write_maps
 
 from mapmeld.cli.parameters import effective_parameters
 from mapmeld.report import FIGURE_NAMES

@@ -16,7 +16,8 @@ from pathlib import Path
 import cv2
 import pytest
 from drawing import cut, office, school, seen_from
-from running import contents, run, run_for_real
+from listing import contents
+from running import run, run_for_real
 
 import mapmeld
 from mapmeld.cli import follow as command

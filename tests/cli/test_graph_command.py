@@ -7,7 +7,8 @@ import time
 from pathlib import Path
 
 import pytest
-from running import T_A_B, contents, run, write_maps
+from listing import contents
+from running import T_A_B, run, write_maps
 
 from mapmeld.se2 import Pose2
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import cv2
 import pytest
-from running import T_A_B, contents, run, run_for_real, write_maps
+from listing import contents
+from running import T_A_B, run, run_for_real, write_maps
 
 import mapmeld
 from mapmeld.report.palette import BLUE, ORANGE

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from running import T_A_B, contents, run, write_maps
+from listing import contents
+from running import T_A_B, run, write_maps
 
 import mapmeld
 from mapmeld.se2 import Pose2

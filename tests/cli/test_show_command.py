@@ -3,8 +3,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from listing import contents
 from numpy.typing import NDArray
-from running import T_A_B, contents, run, write_maps
+from running import T_A_B, run, write_maps
 
 from mapmeld.report.palette import BLUE, GREEN, RED
 

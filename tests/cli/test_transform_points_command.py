@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from running import T_A_B, T_B_A, contents, run, write_maps
+from listing import contents
+from running import T_A_B, T_B_A, run, write_maps
 
 POINTS = "points:\n  - {name: charger, x: 1.0, y: 2.0}\nposes:\n  - {name: dock, x: 1.0, y: 2.0, yaw: 0.5}\n"
 

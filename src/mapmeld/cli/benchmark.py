@@ -168,8 +168,8 @@ def _tolerances(texts: Sequence[str], sets: Sequence[Dataset]) -> dict[str, Tole
 
 def _check_out(out: Path, force: bool) -> None:
     """Find out before the work that its outcome could not be kept."""
-    from mapmeld.cli.folders import check_folder
     from mapmeld.extras import required
+    from mapmeld.io.folders import check_folder
 
     for module in ("pyarrow.parquet", "matplotlib.figure"):
         required(module, "benchmark")

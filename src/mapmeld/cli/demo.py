@@ -21,11 +21,11 @@ def demo(out: FolderOut = Path("mapmeld-demo"), force: Force = False) -> None:
     """Match and merge two maps that come with mapmeld, and show the paper's method in pictures."""
     from mapmeld.cli.example_maps import example_map
     from mapmeld.cli.explain import DOCUMENTS, write_explanation
-    from mapmeld.cli.folders import check_folder, whole_folder
     from mapmeld.cli.maps import load_maps
     from mapmeld.cli.progress import working
     from mapmeld.cli.tables import pose_text, print_lines, print_match
     from mapmeld.io import save
+    from mapmeld.io.folders import check_folder, whole_folder
     from mapmeld.matching.alphabet import AlphabetParameters
     from mapmeld.merging import merge
     from mapmeld.report import POSSIBLE_NAMES, explain, overlay, references, write_picture

@@ -79,13 +79,13 @@ def diff(
     """
     from mapmeld.changes import NoMatchError
     from mapmeld.changes import diff as diff_maps
-    from mapmeld.cli.folders import check_folder
     from mapmeld.cli.json_output import as_json, diff_fields
     from mapmeld.cli.maps import load_maps
     from mapmeld.cli.parameters import effective_parameters
     from mapmeld.cli.placement import given_transform, note_if_unlikely, refuse
     from mapmeld.cli.progress import working
     from mapmeld.cli.tables import print_files, print_lines
+    from mapmeld.io.folders import check_folder
 
     check_folder(out, force=force)
     parameters = effective_parameters(method, params, settings)
@@ -123,10 +123,10 @@ def diff(
 
 def _write(found: MapDiff, paths: list[str], out: Path, force: bool) -> list[Path]:
     from mapmeld.changes.geojson import changes_geojson, geojson_text
-    from mapmeld.cli.folders import whole_folder
     from mapmeld.cli.maps import exact_mode, names_of
     from mapmeld.io import save
     from mapmeld.io.atomic import write_files
+    from mapmeld.io.folders import whole_folder
     from mapmeld.report import changes, write_picture
 
     name_old, name_new = names_of(paths)

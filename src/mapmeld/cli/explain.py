@@ -33,11 +33,11 @@ def explain(
     The other commands use another method unless told otherwise. The folder is written even if the maps
     do not match: it shows where the method failed.
     """
-    from mapmeld.cli.folders import check_folder, whole_folder
     from mapmeld.cli.maps import load_maps, names_of
     from mapmeld.cli.parameters import effective_parameters
     from mapmeld.cli.progress import working
     from mapmeld.cli.tables import print_lines, print_match
+    from mapmeld.io.folders import check_folder, whole_folder
     from mapmeld.matching import Verdict
     from mapmeld.report import POSSIBLE_NAMES
     from mapmeld.report import explain as explain_maps

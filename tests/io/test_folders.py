@@ -2,10 +2,10 @@ import errno
 from pathlib import Path
 
 import pytest
-from running import contents
+from listing import contents
 
-from mapmeld.cli.folders import FolderError, check_folder, whole_folder
 from mapmeld.io import MapFileError
+from mapmeld.io.folders import FolderError, check_folder, whole_folder
 
 
 def write(folder: Path, *, force: bool = False, ours: tuple[str, ...] = (), **files: str) -> None:
