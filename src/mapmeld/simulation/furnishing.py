@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import cv2
@@ -22,7 +22,7 @@ PASSAGE = 0.6
 _CELLS = 20  # of the working lattice in a metre
 _GAP = 0.03  # between two pieces, and to the walls [m]
 _DOOR_ZONE = 0.9  # radius around a door where nothing stands [m]
-_AREA_PER_PIECE = 7.0  # [m^2]
+_AREA_PER_PIECE = 9.0  # [m^2]
 _LARGEST_POCKET = 0.3  # [m^2] of floor that a piece may cut off
 
 
@@ -36,7 +36,7 @@ def furnish(environment: Environment, seed: int, density: float = 1.0) -> Enviro
     seed
         0 or more.
     density
-        1 is a piece (a table with its chairs counts as one) for every 7 square metres.
+        1 is a piece (a table with its chairs counts as one) for every 9 square metres.
     """
     rng = np.random.default_rng((seed, 1))
     rooms = rooms_of(environment.fields)
@@ -104,7 +104,7 @@ class _Room:
             self._try(lambda: self._anywhere(Kind.BOX, *rng.uniform(0.2, 0.45, 2), rng))
         return self.pieces[before:]
 
-    def _try(self, drawn) -> bool:  # type: ignore[no-untyped-def]
+    def _try(self, drawn: Callable[[], Furniture]) -> bool:
         for _ in range(8):
             if self._added(drawn()):
                 return True
