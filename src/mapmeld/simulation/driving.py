@@ -67,7 +67,7 @@ class Moment:
     T_odom_base, T_world_base
         Where odometry believes it to be (from (0, 0, 0) at the start), and where it is.
     command
-        What its driver asked for since the moment before.
+        What its driver asks for from now on.
     scan
         Taken at this time; None if none was.
     """
@@ -103,13 +103,13 @@ def drive(world: World, drivers: Sequence[Driver], duration: float) -> Iterator[
         poses = [world.true_pose(i) for i in range(count)]
         for i in range(count):
             scan = world.scan(i) if tick % every == 0 else None
-            yield Moment(world.time, i, world.odometry(i), poses[i], asked[i], scan)
             if not done[i]:
                 others = tuple((p.x, p.y) for j, p in enumerate(poses) if j != i)
                 answer = drivers[i].command(Sight(world.time, poses[i], scan, others))
                 done[i] = answer is None
                 asked[i] = answer or STOP
                 world.command(i, *asked[i])
+            yield Moment(world.time, i, world.odometry(i), poses[i], asked[i], scan)
         if all(done):
             return
         world.step(TICK)
