@@ -18,11 +18,13 @@ from typer.core import TyperGroup
 from mapmeld import __version__
 from mapmeld.cli.benchmark import benchmark
 from mapmeld.cli.demo import demo
+from mapmeld.cli.environment import environment
 from mapmeld.cli.errors import BAD_INPUT, CLOSED_PIPE, FAULT, INTERRUPTED, NO_MATCH, say
 from mapmeld.cli.explain import explain
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.show import show
+from mapmeld.cli.simulate import simulate
 from mapmeld.errors import MapmeldError
 
 # The class that all complaints about the command line derive from, under the name by which it can be
@@ -145,5 +147,5 @@ def _options(
     pass
 
 
-for _command in (match, merge, show, explain, demo, benchmark):
+for _command in (match, merge, show, explain, demo, benchmark, environment, simulate):
     app.command()(_command)

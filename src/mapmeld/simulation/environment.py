@@ -79,10 +79,9 @@ class Environment:
 
     def __post_init__(self) -> None:
         fields = np.array(self.fields, np.int8, order="C")
+        sides = " x ".join(map(str, fields.shape[::-1]))
         if fields.ndim != 2 or min(fields.shape) < MIN_SIDE or max(fields.shape) > MAX_SIDE:
-            raise SimulationError(
-                f"the ground needs sides of {MIN_SIDE} to {MAX_SIDE} fields, not {' x '.join(map(str, fields.shape[::-1]))}"
-            )
+            raise SimulationError(f"the ground needs sides of {MIN_SIDE} to {MAX_SIDE} fields, not {sides}")
         if fields.min() < EMPTY or fields.max() > 10:
             raise SimulationError("fields have codes from -2 to 10")
         if not (0.02 <= self.wall <= 0.5):
@@ -126,12 +125,10 @@ class Environment:
                 found.append(Box(col + 0.5, (start + end) / 2, self.wall, end - start))
         return tuple(found)
 
-    def _runs(
-        self, before: np.ndarray, after: np.ndarray, is_door: np.ndarray
-    ) -> list[tuple[float, float]]:
+    def _runs(self, before: np.ndarray, after: np.ndarray, is_door: np.ndarray) -> list[tuple[float, float]]:
         """Return (start, end) [m] of the walls along one line of fields."""
         runs: list[list[float]] = []
-        for field in np.flatnonzero(before | after):
+        for field in np.flatnonzero(before | after).tolist():
             jamb = (1 - self.door) / 2 if is_door[field] else 0.5
             # A piece that ends in the middle of its field goes on for half a thickness: corners close.
             low = field if before[field] else field + 0.5 - self.wall / 2

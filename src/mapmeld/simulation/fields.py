@@ -35,7 +35,6 @@ ARMS = (
 """Where the wall piece of each code, 0 to 10, reaches to."""
 
 
-
 class StrayDoorError(ValueError):
     """A door that is in no wall.
 

@@ -106,7 +106,9 @@ class FrontierDriver:
         if not self._planner.any_floor:
             return
         places, sizes = frontiers(grid)
-        keep = np.array([all(math.dist(p, gone) > _REACH for gone in self._given_up) for p in places], np.bool_)
+        keep = np.array(
+            [all(math.dist(p, gone) > _REACH for gone in self._given_up) for p in places], np.bool_
+        )
         places, sizes = places[keep], sizes[keep]
         if not len(places):
             return

@@ -101,14 +101,11 @@ class _Room:
         elif draw < 0.9:
             self._try(lambda: self._anywhere(Kind.CHAIR, 0.42, 0.42, rng))
         else:
-            self._try(lambda: self._anywhere(Kind.BOX, *rng.uniform(0.2, 0.45, 2), rng))
+            self._try(lambda: self._anywhere(Kind.BOX, rng.uniform(0.2, 0.45), rng.uniform(0.2, 0.45), rng))
         return self.pieces[before:]
 
     def _try(self, drawn: Callable[[], Furniture]) -> bool:
-        for _ in range(8):
-            if self._added(drawn()):
-                return True
-        return False
+        return any(self._added(drawn()) for _ in range(8))
 
     def _added(self, piece: Furniture) -> bool:
         """Add a piece if nothing is in its place and the robot still gets everywhere."""
@@ -131,7 +128,7 @@ class _Room:
             free[max(0, row - reach) : row + reach + 1, max(0, col - reach) : col + reach + 1] = False
         clearance = cv2.distanceTransform((~free).astype(np.uint8), cv2.DIST_L2, 5)
         wide = (clearance > PASSAGE / 2 * _CELLS).astype(np.uint8)
-        _, labels, stats, _ = cv2.connectedComponentsWithStats(wide, connectivity=4)
+        _, _, stats, _ = cv2.connectedComponentsWithStats(wide, connectivity=4)
         areas = stats[1:, cv2.CC_STAT_AREA]
         return len(areas) > 0 and float(areas.sum() - areas.max()) <= _LARGEST_POCKET * _CELLS**2
 
@@ -145,7 +142,7 @@ class _Room:
 
     def _table(self, rng: np.random.Generator) -> Furniture:
         # Most tables stand along the walls' directions, hardly any exactly.
-        theta = rng.integers(2) * math.pi / 2 + rng.normal(0, math.radians(4))
+        theta = float(rng.integers(2) * math.pi / 2 + rng.normal(0, math.radians(4)))
         if rng.random() < 0.2:
             theta = rng.uniform(0, math.pi)
         return Furniture(
@@ -158,7 +155,7 @@ class _Room:
         return Furniture(Kind.CHAIR, replace(chair, theta=table.theta + rng.normal(0, 0.4)))
 
     def _at_wall(self, rng: np.random.Generator) -> Furniture:
-        """A cabinet with its back to the next wall in a random direction."""
+        """Return a cabinet with its back to the next wall in a random direction."""
         x, y = self._somewhere(rng)
         length, depth = rng.uniform(0.6, 1.8), rng.uniform(0.3, 0.5)
         ahead = np.array(((1, 0), (0, 1), (-1, 0), (0, -1)), np.float64)[rng.integers(4)]

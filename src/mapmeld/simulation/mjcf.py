@@ -72,7 +72,9 @@ def mjcf(environment: Environment, starts: Sequence[Pose2] = (), robot: Robot = 
         )  # fmt: skip
     actuator = ET.SubElement(root, "actuator")
     for index, start in enumerate(starts):
-        _add_robot(world, actuator, f"robot_{index}", start, robot, _ROBOT_COLOURS[index % len(_ROBOT_COLOURS)])
+        _add_robot(
+            world, actuator, f"robot_{index}", start, robot, _ROBOT_COLOURS[index % len(_ROBOT_COLOURS)]
+        )
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
@@ -81,9 +83,7 @@ def _add_robot(
     world: ET.Element, actuator: ET.Element, name: str, start: Pose2, robot: Robot, colour: str
 ) -> None:
     r = robot.wheel_radius
-    body = ET.SubElement(
-        world, "body", name=name, pos=_v(start.x, start.y, r), euler=_v(0, 0, start.theta)
-    )
+    body = ET.SubElement(world, "body", name=name, pos=_v(start.x, start.y, r), euler=_v(0, 0, start.theta))
     ET.SubElement(body, "freejoint", name=name)
     bottom = 0.03
     casters = bottom  # the ball casters fill the gap below the body
@@ -95,8 +95,8 @@ def _add_robot(
         contype=str(_BODY), conaffinity=str(_OBSTACLE | _BODY), friction="0.3 0.005 0.0001",
     )  # fmt: skip
     ET.SubElement(
-        body, "geom", type="box", pos=_v(-0.015, 0, 0.02), size=_v(0.09, 0.08, 0.04), mass=_n(robot.mass * 0.6),
-        rgba="0.2 0.2 0.2 1", contype="0", conaffinity="0",
+        body, "geom", type="box", pos=_v(-0.015, 0, 0.02), size=_v(0.09, 0.08, 0.04),
+        mass=_n(robot.mass * 0.6), rgba="0.2 0.2 0.2 1", contype="0", conaffinity="0",
     )  # fmt: skip
     for x, lift in ((0.15, 0.002), (-0.15, 0.0)):
         # A ball rolls every way, so without friction.
@@ -112,7 +112,13 @@ def _add_robot(
     for side, y in (("left", robot.track / 2), ("right", -robot.track / 2)):
         wheel = ET.SubElement(body, "body", name=f"{name}_{side}", pos=_v(0, y, 0))
         ET.SubElement(
-            wheel, "joint", name=f"{name}_{side}", type="hinge", axis="0 1 0", damping="0.001", armature="0.002"
+            wheel,
+            "joint",
+            name=f"{name}_{side}",
+            type="hinge",
+            axis="0 1 0",
+            damping="0.001",
+            armature="0.002",
         )
         ET.SubElement(
             wheel, "geom", type="ellipsoid", size=_v(r, robot.wheel_width / 2, r), mass=_n(robot.mass * 0.05),

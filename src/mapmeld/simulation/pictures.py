@@ -41,8 +41,8 @@ class Drive:
         The same by odometry, in its own frame that begins at (0, 0, 0).
     """
 
-    true: Sequence[Pose2]
-    believed: Sequence[Pose2]
+    true: list[Pose2]
+    believed: list[Pose2]
 
 
 def environment_picture(environment: Environment, caption: str = "") -> Picture:

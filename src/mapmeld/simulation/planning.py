@@ -110,8 +110,8 @@ class Planner:
     # ------------------------------------------------------------------ ways
     def costs(self, start: ArrayLike, points: ArrayLike) -> NDArray[np.float64]:
         """Return what the way from `start` (2,) to each of (n, 2) points costs; inf where there is none."""
-        costs = dijkstra(self._graph, directed=False, indices=self.nearest(start)[0])
-        found: NDArray[np.float64] = costs[self.nearest(points)]
+        costs = dijkstra(self._graph, directed=False, indices=self.nearest(start)[:1])
+        found: NDArray[np.float64] = costs[0, self.nearest(points)]
         return found
 
     def path(self, start: ArrayLike, goal: ArrayLike) -> Points | None:
@@ -120,12 +120,13 @@ class Planner:
             return None
         first, last = int(self.nearest(start)[0]), int(self.nearest(goal)[0])
         # From the goal, so that the predecessors are already in the order of driving.
-        costs, following = dijkstra(self._graph, directed=False, indices=last, return_predecessors=True)
-        if not math.isfinite(costs[first]):
+        goals = np.array([last])
+        costs, following = dijkstra(self._graph, directed=False, indices=goals, return_predecessors=True)
+        if not math.isfinite(costs[0, first]):
             return None
         path = [first]
         while path[-1] != last:
-            path.append(int(following[path[-1]]))
+            path.append(int(following[0, path[-1]]))
         cells = np.stack(np.divmod(np.array(path), self._ok.shape[1]), axis=-1)
         return self._metres(cells)
 

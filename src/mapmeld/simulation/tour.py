@@ -140,9 +140,7 @@ def plan_tours(
         start = _start(here, [tour.start for tour in tours], rng)
         stops = np.concatenate([views[room] for room in sorted(chosen)])
         order = _order(plan.planner, (start.x, start.y), stops)
-        tours.append(
-            Tour(start, tuple((float(x), float(y)) for x, y in stops[order]), tuple(sorted(chosen)))
-        )
+        tours.append(Tour(start, tuple((float(x), float(y)) for x, y in stops[order]), tuple(sorted(chosen))))
     return tuple(tours)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from mapmeld.grid import FREE, OCCUPIED, UNKNOWN, Mask, OccupancyGrid
 from mapmeld.simulation.boxes import Box
-from mapmeld.simulation.errors import SimulationError
 from mapmeld.simulation.environment import Environment
+from mapmeld.simulation.errors import SimulationError
 
 MAX_CELLS = 50_000_000
 
@@ -77,6 +77,8 @@ def outside(environment: Environment, resolution: float) -> Mask:
     """Return the cells (rows, cols) from which the edge of the ground is reached without a door."""
     closed = covered(environment, environment.walls(open_doors=False), resolution)
     # A ring of cells around the ground joins all that lies at its edge.
-    _, labels = cv2.connectedComponents(np.pad(~closed, 1, constant_values=True).astype(np.uint8), connectivity=4)
+    _, labels = cv2.connectedComponents(
+        np.pad(~closed, 1, constant_values=True).astype(np.uint8), connectivity=4
+    )
     found: Mask = labels[1:-1, 1:-1] == labels[0, 0]
     return found

@@ -15,8 +15,8 @@ import numpy as np
 from mapmeld.io import AnyPath, MapFileError
 from mapmeld.io.atomic import write_files
 from mapmeld.io.images import open_regular
-from mapmeld.simulation.errors import SimulationError
 from mapmeld.simulation.environment import MAX_SIDE, MIN_SIDE
+from mapmeld.simulation.errors import SimulationError
 from mapmeld.simulation.fields import ARMS, EMPTY, Fields, StrayDoorError, arms_of
 
 MIN_ROOM, MAX_ROOM = 2, 20
@@ -130,7 +130,8 @@ def read_map_text(path: AnyPath) -> Fields:
         rows.append(row)
     if not (MIN_SIDE <= len(rows) <= MAX_SIDE and MIN_SIDE <= width <= MAX_SIDE):
         raise MapFileError.of(
-            path, f"the ground has {width} x {len(rows)} fields; {MIN_SIDE} to {MAX_SIDE} each way can be read"
+            path,
+            f"the ground has {width} x {len(rows)} fields; {MIN_SIDE} to {MAX_SIDE} each way can be read",
         )
     fields = np.array(rows[::-1], np.int8)
     try:
@@ -163,7 +164,9 @@ def _numbered_lines(path: AnyPath) -> list[tuple[int, str]]:
     try:
         text = data.decode("ascii")
     except UnicodeDecodeError:
-        raise MapFileError.of(path, "is no text of the V-REP map generator (it holds more than ASCII)") from None
+        raise MapFileError.of(
+            path, "is no text of the V-REP map generator (it holds more than ASCII)"
+        ) from None
     lines = [line.strip() for line in text.rstrip().split("\n")]
     blank = next((number for number, line in enumerate(lines, 1) if not line), None)
     if blank is not None:

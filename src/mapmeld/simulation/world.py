@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mapmeld.extras import required
 from mapmeld.recording import Scan
-from mapmeld.se2 import Pose2, wrap_angle
+from mapmeld.se2 import Pose2
 from mapmeld.simulation.environment import Environment
 from mapmeld.simulation.errors import SimulationError
 from mapmeld.simulation.mjcf import TIMESTEP, mjcf
@@ -144,7 +144,8 @@ class World:
         beams: NDArray[np.float64] = (self._data.site_xmat[site].reshape(3, 3) @ self._beams).T
         self._mj.mj_multiRay(
             self._model, self._data, self._data.site_xpos[site], beams.reshape(-1), None, True,
-            self._bodies[robot], self._met, self._distances, None, len(beams), self.build.laser.max_range + 1.0,
+            self._bodies[robot], self._met, self._distances, None, len(beams),
+            self.build.laser.max_range + 1.0,
         )  # fmt: skip
         ranges = self._distances + self._rngs[robot].normal(0.0, self.build.range_sigma, len(beams))
         ranges[self._met < 0] = np.inf
