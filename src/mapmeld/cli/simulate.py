@@ -71,10 +71,11 @@ def simulate(
         typer.Option(metavar="FILE", help="Lines 'x y' or 't v w', or a recording of one robot."),
     ] = None,
     start: Annotated[
-        str | None, typer.Option(metavar="X,Y,DEG", help="Where the robot starts [m, degrees].")
+        str | None, typer.Option(metavar="X,Y,DEG", help="Where the robot starts: metres, degrees.")
     ] = None,
     duration: Annotated[
-        float, typer.Option(metavar="S", min=0.1, max=36000.0, help="Stop then at the latest [s].")
+        float,
+        typer.Option(metavar="S", min=0.1, max=36000.0, help="Stop after so many seconds at the latest."),
     ] = 900.0,
     config: ConfigFile = None,
     size: Size = None,

@@ -24,21 +24,21 @@ ConfigFile = Annotated[
     typer.Option("--config", metavar="FILE", help="Configuration of the V-REP map generator: rooms to draw."),
 ]
 Size = Annotated[
-    str | None, typer.Option("--size", metavar="WxH", help="Of the ground [m].  [default: 20x20]")
+    str | None, typer.Option("--size", metavar="WxH", help="Of the ground, in metres (20x20 if not given).")
 ]
 ExtraDoors = Annotated[
     float | None,
     typer.Option(
         metavar="P", min=0.0, max=1.0,
-        help="Probability of a door between neighbouring rooms that need none.  [default: 0.3]",
+        help="Probability of a door between neighbouring rooms that need none (0.3 if not given).",
     ),
 ]  # fmt: skip
 FurnitureDensity = Annotated[
     float,
     typer.Option("--furniture", metavar="D", min=0.0, max=3.0, help="Density of furniture; 0 for none."),
 ]
-Wall = Annotated[float, typer.Option("--wall", metavar="M", help="Thickness of walls [m].")]
-Door = Annotated[float, typer.Option("--door", metavar="M", help="Width of doors [m].")]
+Wall = Annotated[float, typer.Option("--wall", metavar="M", help="Thickness of walls, in metres.")]
+Door = Annotated[float, typer.Option("--door", metavar="M", help="Width of doors, in metres.")]
 
 
 def wanted_environment(

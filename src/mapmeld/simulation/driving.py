@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
@@ -89,8 +90,11 @@ def drive(world: World, drivers: Sequence[Driver], duration: float) -> Iterator[
     Raises
     ------
     SimulationError
-        There is not one driver for each robot, or the laser's rate is not a whole part of 20 Hz.
+        There is not one driver for each robot, the laser's rate is not a whole part of 20 Hz, or the
+        duration is no positive number.
     """
+    if not (math.isfinite(duration) and duration > 0):
+        raise SimulationError(f"a drive lasts a positive number of seconds, not {duration:g}")
     count = len(world.starts)
     if len(drivers) != count:
         raise SimulationError(f"{count} robots need as many drivers, not {len(drivers)}")

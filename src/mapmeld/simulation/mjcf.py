@@ -47,7 +47,7 @@ def mjcf(environment: Environment, starts: Sequence[Pose2] = (), robot: Robot = 
         root,
         "option",
         timestep=_n(TIMESTEP),
-        integrator="implicitfast",
+        integrator="Euler",
         solver="Newton",
         cone="elliptic",
         impratio="10",
@@ -118,15 +118,15 @@ def _add_robot(
             type="hinge",
             axis="0 1 0",
             damping="0.001",
-            armature="0.002",
+            armature="0.005",
         )
         ET.SubElement(
-            wheel, "geom", type="ellipsoid", size=_v(r, robot.wheel_width / 2, r), mass=_n(robot.mass * 0.05),
+            wheel, "geom", name=f"{name}_{side}", type="ellipsoid", size=_v(r, robot.wheel_width / 2, r), mass=_n(robot.mass * 0.05),
             rgba="0.1 0.1 0.1 1", contype="0", conaffinity=str(_FLOOR), condim="4",
             friction=f"{_n(robot.wheel_friction)} 0.003 0.0001",
         )  # fmt: skip
         ET.SubElement(
-            actuator, "velocity", name=f"{name}_{side}", joint=f"{name}_{side}", kv="2",
+            actuator, "velocity", name=f"{name}_{side}", joint=f"{name}_{side}", kv="0.5",
             forcerange=_v(-robot.motor_torque, robot.motor_torque),
         )  # fmt: skip
 

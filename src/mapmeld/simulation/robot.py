@@ -37,7 +37,7 @@ class Robot:
     wheel_radius, wheel_width, track
         Of the driven wheels, and the distance of their middles [m].
     wheel_friction
-        Coefficient of friction of tyre on floor.
+        Coefficient of friction of tyre on floor, on average: see `Grip`.
     motor_torque
         Most that a motor gives [N m].
     encoder_ticks
@@ -56,15 +56,15 @@ class Robot:
 
     max_v: float = 0.8
     max_w: float = 1.61
-    acceleration: float = 1.5
-    turn_acceleration: float = 5.0
+    acceleration: float = 2.5
+    turn_acceleration: float = 8.0
     radius: float = 0.2
     height: float = 0.3
     mass: float = 9.0
     wheel_radius: float = 0.06
     wheel_width: float = 0.03
     track: float = 0.3
-    wheel_friction: float = 0.7
+    wheel_friction: float = 0.5
     motor_torque: float = 1.0
     encoder_ticks: int = 4096
     laser: Laser = PAPER_LASER

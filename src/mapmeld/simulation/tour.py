@@ -97,7 +97,7 @@ def plan_tours(
     """Plan the mappings of one environment.
 
     All of them visit the same connected rooms, at least `common` of the floor; each visits further
-    rooms, its own choice, up to at least `share` of it. Starts differ in place and heading. The
+    rooms, its own choice, up to at least `share` of it and half of all rooms. Starts differ in place and heading. The
     same seed gives the same tours; more of them begin with the same ones.
 
     Parameters
@@ -131,11 +131,11 @@ def plan_tours(
         raise SimulationError("no floor is wide enough for the robot")
     views = {int(room): _views(nodes[rooms == room]) for room in np.unique(rooms)}
     rng = np.random.default_rng((seed, 2))
-    shared = _grown(plan, set(), set(views), common, rng)
+    shared = _grown(plan, set(), set(views), common, 1, rng)
     tours: list[Tour] = []
     for index in range(count):
         rng = np.random.default_rng((seed, 3, index))
-        chosen = _grown(plan, shared, set(views), share, rng)
+        chosen = _grown(plan, shared, set(views), share, math.ceil(len(views) / 2), rng)
         here = nodes[np.isin(rooms, sorted(chosen))]
         start = _start(here, [tour.start for tour in tours], rng)
         stops = np.concatenate([views[room] for room in sorted(chosen)])
@@ -155,12 +155,12 @@ def _neighbours(environment: Environment, rooms: NDArray[np.int32]) -> dict[int,
 
 
 def _grown(
-    plan: FloorPlan, chosen: set[int], possible: set[int], share: float, rng: np.random.Generator
+    plan: FloorPlan, chosen: set[int], possible: set[int], share: float, count: int, rng: np.random.Generator
 ) -> set[int]:
-    """Add random neighbouring rooms until the share of the floor is reached; the first is the largest."""
+    """Add random neighbouring rooms until share of the floor and count are reached; first the largest."""
     total = sum(plan.areas[room] for room in possible)
     found = chosen or {max(sorted(possible), key=lambda room: float(plan.areas[room]))}
-    while sum(plan.areas[room] for room in found) < share * total - 1e-9:
+    while len(found) < count or sum(plan.areas[room] for room in found) < share * total - 1e-9:
         beside = {n for room in found for n in plan.neighbours.get(room, ())} & possible - found
         # The rest may hang on by a wide gap instead of a door: then anything goes.
         options = sorted(beside or possible - found)

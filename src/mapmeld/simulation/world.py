@@ -14,6 +14,7 @@ from mapmeld.recording import Scan
 from mapmeld.se2 import Pose2
 from mapmeld.simulation.environment import Environment
 from mapmeld.simulation.errors import SimulationError
+from mapmeld.simulation.grip import Grip
 from mapmeld.simulation.mjcf import TIMESTEP, mjcf
 from mapmeld.simulation.odometry import WheelOdometry
 from mapmeld.simulation.robot import MECABOT, Robot
@@ -74,6 +75,12 @@ class World:
             ],
             np.int64,
         ).reshape(-1, 2)
+        self._tyres = [
+            (self._model.body(name).id, self._model.geom(name).id)
+            for i in range(len(self.starts))
+            for name in (f"robot_{i}_left", f"robot_{i}_right")
+        ]
+        self._grip = Grip(environment)
         self._odometry = [WheelOdometry(build) for _ in self.starts]
         bearings = build.laser.bearings()
         self._beams = np.stack([np.cos(bearings), np.sin(bearings), np.zeros_like(bearings)])
@@ -122,10 +129,17 @@ class World:
             half = self._set[:, 1] * build.track / 2
             self._data.ctrl[self._motors[:, 0]] = (self._set[:, 0] - half) / build.wheel_radius
             self._data.ctrl[self._motors[:, 1]] = (self._set[:, 0] + half) / build.wheel_radius
+            self._feel_floor()
             self._mj.mj_step(self._model, self._data, nstep=round(CONTROL_PERIOD / TIMESTEP))
             for odometry, at in zip(self._odometry, self._wheels_at, strict=True):
                 odometry.read(*self._data.qpos[at])
         self.time += periods * CONTROL_PERIOD
+
+    def _feel_floor(self) -> None:
+        """Give each tyre the friction of the place that it stands on."""
+        for body, geom in self._tyres:
+            x, y, _ = self._data.xpos[body]
+            self._model.geom_friction[geom, 0] = self.build.wheel_friction * self._grip.at(float(x), float(y))
 
     # ------------------------------------------------------------------ to look
     def true_pose(self, robot: int) -> Pose2:
