@@ -22,7 +22,7 @@ class Grip:
     def __init__(self, environment: Environment) -> None:
         rng = np.random.default_rng(zlib.crc32(environment.fields.tobytes()))
         rows, cols = (math.ceil(side / _PATCH) + 2 for side in environment.fields.shape)
-        self._patches: list[list[float]] = rng.uniform(_LEAST, _MOST, (rows, cols)).tolist()
+        self._patches = [list(map(float, row)) for row in rng.uniform(_LEAST, _MOST, (rows, cols))]
         self._last = rows - 2, cols - 2
 
     def at(self, x: float, y: float) -> float:

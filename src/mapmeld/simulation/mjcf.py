@@ -121,7 +121,8 @@ def _add_robot(
             armature="0.005",
         )
         ET.SubElement(
-            wheel, "geom", name=f"{name}_{side}", type="ellipsoid", size=_v(r, robot.wheel_width / 2, r), mass=_n(robot.mass * 0.05),
+            wheel, "geom", name=f"{name}_{side}", type="ellipsoid", size=_v(r, robot.wheel_width / 2, r),
+            mass=_n(robot.mass * 0.05),
             rgba="0.1 0.1 0.1 1", contype="0", conaffinity=str(_FLOOR), condim="4",
             friction=f"{_n(robot.wheel_friction)} 0.003 0.0001",
         )  # fmt: skip
