@@ -11,7 +11,7 @@ from mapmeld.io import Mode
 from mapmeld.matching import DEFAULT_METHOD as THE_DEFAULT_METHOD
 from mapmeld.merging import FUSIONS
 
-COMMANDS = ("match", "merge", "show", "explain", "demo", "benchmark")
+COMMANDS = ("match", "merge", "show", "explain", "demo", "benchmark", "environment", "simulate")
 
 
 def test_help_names_every_command_and_the_exit_codes() -> None:

@@ -22,13 +22,16 @@ class Grip:
     def __init__(self, environment: Environment) -> None:
         rng = np.random.default_rng(zlib.crc32(environment.fields.tobytes()))
         rows, cols = (math.ceil(side / _PATCH) + 2 for side in environment.fields.shape)
-        self._patches = [list(map(float, row)) for row in rng.uniform(_LEAST, _MOST, (rows, cols))]
-        self._last = rows - 2, cols - 2
+        self._patches: list[list[float]] = [
+            [float(p) for p in row] for row in rng.uniform(_LEAST, _MOST, (rows, cols))
+        ]
+        self._last = float(cols - 2), float(rows - 2)
 
     def at(self, x: float, y: float) -> float:
         """Return the factor at a place [m]; beyond the ground that at its edge."""
-        u = min(max(x / _PATCH, 0.0), self._last[1] + 0.999)
-        v = min(max(y / _PATCH, 0.0), self._last[0] + 0.999)
+        right, top = self._last
+        u = min(max(x / _PATCH, 0.0), right + 0.999)
+        v = min(max(y / _PATCH, 0.0), top + 0.999)
         col, row = int(u), int(v)
         u, v = u - col, v - row
         low, high = self._patches[row], self._patches[row + 1]
