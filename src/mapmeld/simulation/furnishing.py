@@ -23,6 +23,7 @@ _CELLS = 20  # of the working lattice in a metre
 _GAP = 0.03  # between two pieces, and to the walls [m]
 _DOOR_ZONE = 0.9  # radius around a door where nothing stands [m]
 _AREA_PER_PIECE = 9.0  # [m^2]
+_SURROUNDINGS = 1.5  # around a piece, in which the way past it is looked for [m]
 _LARGEST_POCKET = 0.3  # [m^2] of floor that a piece may cut off
 
 
@@ -72,9 +73,13 @@ class _Room:
         self.blocked = walls | ~self.floor
         self.taken = self.blocked.copy()
         for centre in self.doors:
-            y, x = np.mgrid[: shape[0], : shape[1]] + 0.5
-            away = np.hypot(x / _CELLS - (centre - self.corner)[0], y / _CELLS - (centre - self.corner)[1])
-            self.taken |= away < _DOOR_ZONE
+            x, y = centre - self.corner
+            zone = self._around(Box(x, y, 2 * _DOOR_ZONE, 2 * _DOOR_ZONE))
+            v, u = np.mgrid[zone] + 0.5
+            self.taken[zone] |= np.hypot(u / _CELLS - x, v / _CELLS - y) < _DOOR_ZONE
+            # The room ends in its doors, where nothing stands: they count as floor that must be reached.
+            row, col, half = int(y * _CELLS), int(x * _CELLS), _CELLS // 2
+            self.blocked[max(0, row - half) : row + half + 1, max(0, col - half) : col + half + 1] = False
         self.pieces: list[Furniture] = []
 
     def _here(self, boxes: Iterable[Box]) -> list[Box]:
@@ -109,28 +114,31 @@ class _Room:
 
     def _added(self, piece: Furniture) -> bool:
         """Add a piece if nothing is in its place and the robot still gets everywhere."""
-        mask = np.zeros(self.floor.shape, np.bool_)
-        cover(mask, self._here([piece.footprint.grown(_GAP)]), 1 / _CELLS)
-        blocked = self.blocked | mask
-        if not mask.any() or (mask & self.taken).any() or not self._passable(blocked):
+        (footprint,) = self._here([piece.footprint.grown(_GAP)])
+        # All that matters is near: who could get past its surroundings before must still be able to.
+        window = self._around(footprint)
+        blocked, taken = self.blocked[window], self.taken[window]
+        mask = np.zeros(blocked.shape, np.bool_)
+        row, col = window[0].start, window[1].start
+        cover(
+            mask, [replace(footprint, x=footprint.x - col / _CELLS, y=footprint.y - row / _CELLS)], 1 / _CELLS
+        )
+        if not mask.any() or (mask & taken).any() or not _passable(blocked, blocked | mask):
             return False
-        self.blocked = blocked
-        self.taken |= mask
+        blocked |= mask
+        taken |= mask
         self.pieces.append(piece)
         return True
 
-    def _passable(self, blocked: Mask) -> bool:
-        """Whether all doors, and all but tiny pockets of the floor, are reached from one another."""
-        free = blocked.copy()
-        for centre in self.doors:  # the floor ends at the door: do not count that as an obstacle
-            col, row = np.floor((centre - self.corner) * _CELLS).astype(int)
-            reach = _CELLS // 2
-            free[max(0, row - reach) : row + reach + 1, max(0, col - reach) : col + reach + 1] = False
-        clearance = cv2.distanceTransform((~free).astype(np.uint8), cv2.DIST_L2, 5)
-        wide = (clearance > PASSAGE / 2 * _CELLS).astype(np.uint8)
-        _, _, stats, _ = cv2.connectedComponentsWithStats(wide, connectivity=4)
-        areas = stats[1:, cv2.CC_STAT_AREA]
-        return len(areas) > 0 and float(areas.sum() - areas.max()) <= _LARGEST_POCKET * _CELLS**2
+    def _around(self, box: Box) -> tuple[slice, slice]:
+        reach_x, reach_y = (reach + _SURROUNDINGS for reach in box.reach())
+        rows, cols = self.floor.shape
+        bounds = (
+            (max(0, math.floor((middle - reach) * _CELLS)), min(size, math.ceil((middle + reach) * _CELLS)))
+            for middle, reach, size in ((box.y, reach_y, rows), (box.x, reach_x, cols))
+        )
+        (row0, row1), (col0, col1) = bounds
+        return slice(row0, max(row0, row1)), slice(col0, max(col0, col1))
 
     # ------------------------------------------------------------------ what and where
     def _somewhere(self, rng: np.random.Generator) -> tuple[float, float]:
@@ -169,3 +177,24 @@ class _Room:
         centre[axis] = wall - ahead[axis] * (self.wall / 2 + depth / 2 + 2 * _GAP)
         sides = (depth, length) if axis == 0 else (length, depth)
         return Furniture(Kind.CABINET, Box(float(centre[0]), float(centre[1]), *sides))
+
+
+def _passable(before: Mask, after: Mask) -> bool:
+    """Whether what hung together before still does, except for tiny pockets."""
+    was, now = _wide(before), _wide(after)
+    count, parts = cv2.connectedComponents(was, connectivity=4)
+    for number in range(1, count):
+        left = np.where(parts == number, now, 0).astype(np.uint8)
+        areas = cv2.connectedComponentsWithStats(left, connectivity=4)[2][1:, cv2.CC_STAT_AREA]
+        if (areas > _LARGEST_POCKET * _CELLS**2).sum() > 1 or (
+            not len(areas) and (parts == number).sum() > _LARGEST_POCKET * _CELLS**2
+        ):
+            return False
+    return True
+
+
+def _wide(blocked: Mask) -> NDArray[np.uint8]:
+    """Return where the middle of something of the width of a passage can be, as 0 and 1."""
+    clearance = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, 5)
+    wide: NDArray[np.uint8] = (clearance > PASSAGE / 2 * _CELLS).astype(np.uint8)
+    return wide
