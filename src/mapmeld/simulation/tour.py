@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -219,15 +219,20 @@ def _order(planner: Planner, start: tuple[float, float], stops: Points) -> list[
 
 
 class TourDriver:
-    """Drives through all stops in order, then stops; leaves out what it cannot reach."""
+    """Drives through all stops in order, then stops.
+
+    A stop that it cannot reach (another robot may stand there) is tried once more at the end; what it
+    cannot reach then either is in `left_out`.
+    """
 
     def __init__(
         self, plan: FloorPlan, stops: tuple[tuple[float, float], ...], robot: Robot = MECABOT, seed: int = 0
     ) -> None:
         self._pilot = Pilot(plan.path, robot, np.random.default_rng((seed, 4)))
-        self._stops: Iterator[tuple[float, float]] = iter(stops)
-        self.left_out: list[tuple[float, float]] = []
+        self._first, self._again = deque(stops), deque[tuple[float, float]]()
         self._stop: tuple[float, float] | None = None
+        self._is_second = False
+        self.left_out: list[tuple[float, float]] = []
 
     def command(self, sight: Sight) -> Command | None:
         """Return what to do; None after the last stop."""
@@ -238,8 +243,10 @@ class TourDriver:
                     if command is not None:
                         return command
                 if math.dist(self._stop, (sight.T_world_base.x, sight.T_world_base.y)) > 0.5:
-                    self.left_out.append(self._stop)
-            self._stop = next(self._stops, None)
+                    (self.left_out if self._is_second else self._again).append(self._stop)
+            self._is_second = not self._first
+            waiting = self._first or self._again
+            self._stop = waiting.popleft() if waiting else None
             if self._stop is None:
                 return None
             self._pilot.go(self._stop)
