@@ -24,6 +24,8 @@ COMMANDS = (
     "explain",
     "demo",
     "benchmark",
+    "environment",
+    "simulate",
     "bag",
 )
 

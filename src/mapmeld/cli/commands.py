@@ -20,6 +20,7 @@ from mapmeld.cli.bag import bag
 from mapmeld.cli.benchmark import benchmark
 from mapmeld.cli.demo import demo
 from mapmeld.cli.diff import diff
+from mapmeld.cli.environment import environment
 from mapmeld.cli.errors import BAD_INPUT, CLOSED_PIPE, FAULT, INTERRUPTED, NO_MATCH, say
 from mapmeld.cli.explain import explain
 from mapmeld.cli.follow import follow
@@ -28,6 +29,7 @@ from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.rebase import rebase
 from mapmeld.cli.show import show
+from mapmeld.cli.simulate import simulate
 from mapmeld.cli.transform_points import transform_points
 from mapmeld.errors import MapmeldError
 
@@ -153,6 +155,7 @@ def _options(
 
 for _command in (
     match, merge, graph, follow, diff, rebase, transform_points, show, explain, demo, benchmark,
+    environment, simulate,
 ):  # fmt: skip
     app.command()(_command)
 app.add_typer(bag)
