@@ -51,7 +51,7 @@ class Trajectory:
 
 @dataclass(frozen=True, slots=True)
 class _Beams:
-    """One scan in the robot's frame, in cells: for the matching (n, 4) and for the map (m, 2), (m,)."""
+    """One scan in the robot's frame, in cells: for the matching (n, 2), and for the map (m, 2), (m,)."""
 
     to_match: Floats
     ends: Floats
@@ -96,7 +96,7 @@ class GMapping:
         self._rng = np.random.default_rng(seed)
         self._sensor = Sensor(
             int(p.kernelSize),
-            p.delta**2 / p.sigma,
+            p.delta**2 / (2 * p.sigma**2),
             p.delta**2 / p.lsigma,
             -_MISSED / p.lsigma,
         )
@@ -186,7 +186,7 @@ class GMapping:
         to_match = valid & (ranges <= self._max_used)
         to_match &= np.arange(len(ranges)) % (p.lskip + 1) == p.lskip
         return _Beams(
-            np.column_stack([ends, self._directions])[to_match],
+            ends[to_match],
             ends[valid],
             (ranges < self._max_used)[valid],
             float(used.max(initial=0.0)) / p.delta + float(np.hypot(*self._start)),

@@ -26,10 +26,8 @@ PATCH = 1 << PATCH_BITS
 
 _LOW = PATCH - 1
 
-# Constants of GMapping: from which share of hits on a cell counts as wall, and how far before the end
-# of a beam the way has to be free (a diagonal of a cell).
 FULLNESS = 0.1
-FREE_CELLS = math.sqrt(2.0)
+"""From which share of hits on a cell is wall to the scan matching: GMapping's constant."""
 
 
 class Sensor(NamedTuple):
@@ -69,14 +67,13 @@ def evaluate(
     x: float,
     y: float,
     theta: float,
-    beams: Floats,
+    ends: Floats,
     sensor: Sensor,
     enough: float,
 ) -> tuple[float, float]:
     """Return how well a scan fits a map at a pose: (score, log-likelihood).
 
-    Every beam looks for the nearest wall around its end: the mean point of a cell that is wall while
-    the cell before it, as seen from the laser, is not.
+    Every beam looks for the nearest wall around its end: the mean point of the hits in a cell that is wall.
 
     Parameters
     ----------
@@ -84,34 +81,30 @@ def evaluate(
         The patches, and which of them the map has where.
     x, y, theta
         The robot's pose.
-    beams
-        (n, 4): ends of the beams in the robot's frame, and their directions (unit vectors).
+    ends
+        (n, 2) ends of the beams in the robot's frame.
     enough
         The evaluation is given up, with a score of no more than this, as soon as the score
         cannot exceed it any more.
     """
     rows, cols = table.shape
     reach = sensor.kernel
-    # Beyond these a window would leave the table: two more cells for the cell before, a patch beside.
-    bottom, top = reach + 2, (rows << PATCH_BITS) - reach - 2
-    left, right = reach + 2, ((cols - 1) << PATCH_BITS) - reach - 2
+    # Beyond these a window, which takes in the patch beside, would leave the table.
+    bottom, top = reach, (rows << PATCH_BITS) - reach
+    left, right = reach, ((cols - 1) << PATCH_BITS) - reach
     mask = (1 << (2 * reach + 1)) - 1
     c, s = math.cos(theta), math.sin(theta)
     score = 0.0
     likelihood = 0.0
-    for k in range(beams.shape[0]):
-        end_x = x + c * beams[k, 0] - s * beams[k, 1]
-        end_y = y + s * beams[k, 0] + c * beams[k, 1]
+    for k in range(ends.shape[0]):
+        end_x = x + c * ends[k, 0] - s * ends[k, 1]
+        end_y = y + s * ends[k, 0] + c * ends[k, 1]
         col, row = math.floor(end_x), math.floor(end_y)
         nearest = np.inf
         if bottom <= row < top and left <= col < right:
-            back_col = math.floor(end_x - FREE_CELLS * (c * beams[k, 2] - s * beams[k, 3])) - col
-            back_row = math.floor(end_y - FREE_CELLS * (s * beams[k, 2] + c * beams[k, 3])) - row
             for r in range(row - reach, row + reach + 1):
                 q = col - reach
                 found = _window(walls, table, r, q) & mask
-                if found:
-                    found &= ~_window(walls, table, r + back_row, q + back_col)
                 while found:
                     if found & 1:
                         patch = table[r >> PATCH_BITS, q >> PATCH_BITS]
@@ -126,7 +119,7 @@ def evaluate(
             likelihood -= sensor.likelihood_gain * nearest
         else:
             likelihood += sensor.missed
-        if score + (beams.shape[0] - 1 - k) <= enough:
+        if score + (ends.shape[0] - 1 - k) <= enough:
             break
     return score, likelihood
 
@@ -137,7 +130,7 @@ def climb(
     walls: Bits,
     tables: Ids,
     poses: Floats,
-    beams: Floats,
+    ends: Floats,
     sensor: Sensor,
     step: float,
     turn: float,
@@ -153,7 +146,7 @@ def climb(
     for n in range(poses.shape[0]):
         table = tables[n]
         x, y, theta = poses[n, 0], poses[n, 1], poses[n, 2]
-        score, likelihood = evaluate(cells, walls, table, x, y, theta, beams, sensor, -1.0)
+        score, likelihood = evaluate(cells, walls, table, x, y, theta, ends, sensor, -1.0)
         along, about = step, turn
         halved = 0
         undo = -1
@@ -167,7 +160,7 @@ def climb(
                 there_x = x + way * along if move >> 1 == 0 else x
                 there_y = y + way * along if move >> 1 == 1 else y
                 there_theta = theta + way * about if move >> 1 == 2 else theta
-                found = evaluate(cells, walls, table, there_x, there_y, there_theta, beams, sensor, score)
+                found = evaluate(cells, walls, table, there_x, there_y, there_theta, ends, sensor, score)
                 if found[0] > score:
                     score, likelihood = found
                     best, best_x, best_y, best_theta = move, there_x, there_y, there_theta
@@ -186,13 +179,13 @@ def climb(
 
 @compiled
 def likelihoods_around(
-    cells: Cells, walls: Bits, table: Ids, poses: Floats, beams: Floats, sensor: Sensor
+    cells: Cells, walls: Bits, table: Ids, poses: Floats, ends: Floats, sensor: Sensor
 ) -> Floats:
     """Return the log-likelihood (n,) of a scan at each pose (n, 3) on one map."""
     found = np.empty(poses.shape[0])
     for n in range(poses.shape[0]):
         found[n] = evaluate(
-            cells, walls, table, poses[n, 0], poses[n, 1], poses[n, 2], beams, sensor, -1.0
+            cells, walls, table, poses[n, 0], poses[n, 1], poses[n, 2], ends, sensor, -1.0
         )[1]
     return found
 
