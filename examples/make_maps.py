@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -329,8 +329,13 @@ def add_scan(log_odds: Floats, position: Floats, angles: Floats, ranges: Floats)
     np.clip(log_odds, -LOG_ODDS_LIMIT, LOG_ODDS_LIMIT, out=log_odds)
 
 
-def simulate(building: Building, tour: Tour, rng: np.random.Generator) -> OccupancyGrid:
-    """Drive the tour and return the robot's map; its frame's origin is the start pose."""
+def grow(
+    building: Building, tour: Tour, rng: np.random.Generator, every: int
+) -> Iterator[tuple[int, OccupancyGrid]]:
+    """Drive the tour; give the robot's map after every so many scans, and after the last, with their number.
+
+    The origin of the map's frame is the start pose.
+    """
     plan, blocked = draw(building)
     true = drive(blocked, tour)
     T_map_plan = tour.start.inverse()
@@ -339,14 +344,34 @@ def simulate(building: Building, tour: Tour, rng: np.random.Generator) -> Occupa
     corner = np.floor(believed[:, :2].min(axis=0) - RANGE - 1.0)
     size = np.ceil((believed[:, :2].max(axis=0) + RANGE + 1.0 - corner) / MAP_RESOLUTION).astype(int)
     log_odds = np.zeros((size[1], size[0]))
-    for (x, y, theta), (bx, by, b_theta) in zip(true, believed, strict=True):
+    for scans, ((x, y, theta), (bx, by, b_theta)) in enumerate(zip(true, believed, strict=True), start=1):
         ranges = cast_rays(plan, Pose2(x, y, theta), BEARINGS) + rng.normal(0.0, RANGE_SIGMA, BEARINGS.size)
         position = (np.array((bx, by)) - corner) / MAP_RESOLUTION
         add_scan(log_odds, position, b_theta + BEARINGS, ranges / MAP_RESOLUTION)
-    cells = np.full(log_odds.shape, UNKNOWN, np.int8)
-    cells[log_odds < 0] = FREE
-    cells[log_odds > 0] = OCCUPIED
-    return OccupancyGrid(cells, MAP_RESOLUTION, Pose2(float(corner[0]), float(corner[1]))).cropped(margin=5)
+        if scans % every == 0 or scans == len(true):
+            cells = np.full(log_odds.shape, UNKNOWN, np.int8)
+            cells[log_odds < 0] = FREE
+            cells[log_odds > 0] = OCCUPIED
+            whole = OccupancyGrid(cells, MAP_RESOLUTION, Pose2(float(corner[0]), float(corner[1])))
+            yield scans, whole.cropped(margin=5)
+
+
+def simulate(building: Building, tour: Tour, rng: np.random.Generator) -> OccupancyGrid:
+    """Drive the tour and return the robot's map; its frame's origin is the start pose."""
+    *_, (_, final) = grow(building, tour, rng, every=sys.maxsize)
+    return final
+
+
+def map_jobs(seed: int) -> dict[str, tuple[Building, Tour, np.random.Generator]]:
+    """Return what each map is made of, by name.
+
+    Each robot has a stream of numbers of its own: changing one tour leaves the other maps as they are.
+    """
+    jobs = [(name, OFFICE, tour) for name, tour in TOURS.items()] + [("other_building", OTHER, OTHER_TOUR)]
+    return {
+        name: (building, tour, np.random.default_rng((seed, number)))
+        for number, (name, building, tour) in enumerate(jobs)
+    }
 
 
 # ---------------------------------------------------------------------- files
@@ -366,16 +391,11 @@ def truth(tours: dict[str, Tour]) -> dict[str, object]:
 
 def write_all(out: Path, seed: int, force: bool) -> None:
     """Simulate every robot and write its map and the truth into the folder `out`."""
-    names = [*TOURS, "other_building"]
-    files = [out / f"{name}.{ending}" for name in names for ending in ("yaml", "pgm")] + [out / "truth.yaml"]
+    jobs = map_jobs(seed)
+    files = [out / f"{name}.{ending}" for name in jobs for ending in ("yaml", "pgm")] + [out / "truth.yaml"]
     out.mkdir(parents=True, exist_ok=True)
     check_targets(files, force=force)  # before the work, not after it
-    jobs = [(name, OFFICE, tour) for name, tour in TOURS.items()] + [("other_building", OTHER, OTHER_TOUR)]
-    # A stream of numbers for each robot: changing one tour leaves the other maps as they are.
-    maps = {
-        name: simulate(building, tour, np.random.default_rng((seed, number)))
-        for number, (name, building, tour) in enumerate(jobs)
-    }
+    maps = {name: simulate(*job) for name, job in jobs.items()}
     for name, grid in maps.items():
         save(grid, out / f"{name}.yaml", force=force)
     text = (

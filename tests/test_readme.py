@@ -23,8 +23,8 @@ def blocks(language: str) -> list[object]:
 
 @pytest.fixture
 def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder with the example maps in it, as in a clone."""
-    shutil.copytree(ROOT / "examples" / "maps", tmp_path / "examples" / "maps")
+    """An empty folder with the examples in it, as in a clone."""
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -11,7 +11,7 @@ from mapmeld.io import Mode
 from mapmeld.matching import DEFAULT_METHOD as THE_DEFAULT_METHOD
 from mapmeld.merging import FUSIONS
 
-COMMANDS = ("match", "merge", "show", "explain", "demo", "benchmark")
+COMMANDS = ("match", "merge", "show", "explain", "demo", "benchmark", "bag")
 
 
 def test_help_names_every_command_and_the_exit_codes() -> None:
@@ -35,7 +35,9 @@ def test_every_command_has_help(command: str) -> None:
     assert run(command, "-h").code == 0
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["merge", "--help"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["--version"], ["merge", "--help"], ["bag", "export", "--help"]]
+)
 def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
     script = (
         "import sys\n"

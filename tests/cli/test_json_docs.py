@@ -11,7 +11,9 @@ from running import run, write_maps
 from mapmeld.matching import Alternative, MatchResult, Verdict
 from mapmeld.se2 import Pose2
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "json.md"
+ROOT = Path(__file__).parents[2]
+DOCUMENT = ROOT / "docs" / "json.md"
+RECORDING = ROOT / "examples" / "recording" / "two_robots.mcap"
 
 
 def documented(schema: str) -> set[str]:
@@ -39,10 +41,12 @@ def in_short(names: set[str]) -> set[str]:
     return {name for name in names if not any(n.startswith((f"{name}.", f"{name}[]")) for n in names)}
 
 
-@pytest.mark.parametrize("schema", ["mapmeld.match/1", "mapmeld.merge/1"])
+@pytest.mark.parametrize("schema", ["mapmeld.match/1", "mapmeld.merge/1", "mapmeld.bag.info/1"])
 def test_the_document_lists_what_is_printed(tmp_path: Path, schema: str) -> None:
     if schema == "mapmeld.match/1":
         outcome = run("match", *write_maps(tmp_path, "a", "b"), "--json")
+    elif schema == "mapmeld.bag.info/1":
+        outcome = run("bag", "info", RECORDING, "--json")
     else:
         # One map joins, one is refused with a transform.
         maps = write_maps(tmp_path, "a", "b", "mirrored")

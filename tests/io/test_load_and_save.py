@@ -81,7 +81,9 @@ def test_the_format_can_be_named(tmp_path: Path) -> None:
     assert np.array_equal(picture.cells, GRID.cells)
     with pytest.raises(MapFileError, match=r"not a known kind of map file .*yaml .*pgm"):
         load(tmp_path / "description")
-    with pytest.raises(MapFileError, match=r"no map format is called 'bag' \(there are: map_server, image\)"):
+    with pytest.raises(
+        MapFileError, match=r"no map format is called 'bag' \(there are: map_server, image, recording\)"
+    ):
         load(tmp_path / "description", format="bag")
 
 
@@ -92,10 +94,11 @@ def test_readers_get_the_path_as_it_was_given(monkeypatch: pytest.MonkeyPatch) -
         seen.append((path, resolution))
         return GRID
 
-    monkeypatch.setitem(FORMATS, "bag", io.MapFormat((".bag",), read))
-    assert load("some//file.bag#/map@12.5", format="bag") is GRID
+    monkeypatch.setitem(FORMATS, "recording", io.MapFormat((".bag",), read))
+    assert load("some//file.bag#/map@12.5") is GRID
+    assert load("any#thing@all", format="recording") is GRID
     assert load("file.BAG") is GRID
-    assert seen == [("some//file.bag#/map@12.5", None), ("file.BAG", None)]
+    assert seen == [("some//file.bag#/map@12.5", None), ("any#thing@all", None), ("file.BAG", None)]
 
 
 def test_messages_stay_on_one_line_whatever_the_name(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ import typer
 from typer.core import TyperGroup
 
 from mapmeld import __version__
+from mapmeld.cli.bag import bag
 from mapmeld.cli.benchmark import benchmark
 from mapmeld.cli.demo import demo
 from mapmeld.cli.errors import BAD_INPUT, CLOSED_PIPE, FAULT, INTERRUPTED, NO_MATCH, say
@@ -147,3 +148,4 @@ def _options(
 
 for _command in (match, merge, show, explain, demo, benchmark):
     app.command()(_command)
+app.add_typer(bag)

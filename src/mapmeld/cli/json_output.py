@@ -15,12 +15,14 @@ from mapmeld import __version__
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from mapmeld.io.recordings import RecordingInfo
     from mapmeld.matching import MatchResult
     from mapmeld.merging import MergeResult
     from mapmeld.se2 import Pose2
 
 MATCH_SCHEMA = "mapmeld.match/1"
 MERGE_SCHEMA = "mapmeld.merge/1"
+BAG_INFO_SCHEMA = "mapmeld.bag.info/1"
 
 Fields = dict[str, Any]
 
@@ -88,6 +90,36 @@ def merge_fields(
         ],
         "files": [str(file) for file in files],
         "seconds": seconds,
+    }
+
+
+def bag_info_fields(info: RecordingInfo, path: str) -> Fields:
+    """Return the fields of schema mapmeld.bag.info/1."""
+    return {
+        "schema": BAG_INFO_SCHEMA,
+        "mapmeld": __version__,
+        "path": path,
+        "start": info.start,
+        "topics": [
+            {
+                "name": topic.name,
+                "type": topic.type,
+                "encoding": topic.encoding,
+                "maps": topic.maps,
+                "updates": topic.updates,
+                "first": topic.first,
+                "last": topic.last,
+                "first_stamp": topic.first_stamp,
+                "last_stamp": topic.last_stamp,
+                "frame_id": topic.frame_id,
+                "resolution": topic.resolution,
+                "rows": topic.shape[0] if topic.shape else None,
+                "cols": topic.shape[1] if topic.shape else None,
+                "problem": topic.problem,
+            }
+            for topic in info.topics
+        ],
+        "left_out": info.left_out,
     }
 
 

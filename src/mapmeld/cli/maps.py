@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,9 +21,9 @@ def load_maps(paths: Sequence[str], resolution: float | None) -> list[OccupancyG
         cells of such different sizes that one of them must be wrong.
     """
     from mapmeld.grid import MAX_RATIO
-    from mapmeld.io import FORMATS, MapFileError, load
+    from mapmeld.io import MapFileError, format_of, load
 
-    bare = [Path(path).suffix.lower() in FORMATS["image"].suffixes for path in paths]
+    bare = [format_of(path) == "image" for path in paths]
     if resolution is not None and not any(bare):
         raise MapFileError("--resolution is for bare images; these maps state their own")
     grids = [
@@ -41,9 +42,25 @@ def load_maps(paths: Sequence[str], resolution: float | None) -> list[OccupancyG
 
 
 def names_of(paths: Sequence[str]) -> list[str]:
-    """Return the shortest ends of the paths that tell them apart: usually the file names."""
-    for depth in range(1, max((len(Path(path).parts) for path in paths), default=1) + 1):
-        names = ["/".join(Path(path).parts[-depth:]) for path in paths]
+    """Return the shortest ends of the paths that tell them apart: usually the file names.
+
+    Of a map in a recording, what follows the file's name is kept as it is.
+    """
+    from mapmeld.io.recordings.address import split_address
+
+    split = [split_address(path) for path in paths]
+    parts = [Path(file).parts for file, _ in split]
+    within = ["" if rest is None else f"#{rest}" for _, rest in split]
+    for depth in range(1, max(map(len, parts), default=1) + 1):
+        names = ["/".join(own[-depth:]) + rest for own, rest in zip(parts, within, strict=True)]
         if len(set(names)) == len(names):
             return names
     return list(paths)
+
+
+def same_map(path: str) -> str:
+    """Return a text that is the same for two paths if they are surely of the same map."""
+    from mapmeld.io.recordings.address import split_address
+
+    file, rest = split_address(path)
+    return os.path.realpath(file) + ("" if rest is None else f"#{rest}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -99,10 +98,12 @@ def merge(
 
 
 def _note_repeated(maps: Sequence[str]) -> None:
-    """Say of every file that was given more than once that it counts as often."""
+    """Say of every map that was given more than once that it counts as often."""
+    from mapmeld.cli.maps import same_map
+
     numbers: dict[str, list[int]] = {}
     for number, path in enumerate(maps, start=1):
-        numbers.setdefault(os.path.realpath(path), []).append(number)
+        numbers.setdefault(same_map(path), []).append(number)
     for same in numbers.values():
         if len(same) > 1:
             times = "twice" if len(same) == 2 else f"{len(same)} times"

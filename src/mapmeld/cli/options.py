@@ -11,9 +11,13 @@ import typer
 DEFAULT_METHOD = "correlative"
 """That of `mapmeld.matching`, named here so that help need not import it."""
 
-# Texts, not Paths: later formats put more than a file name into them.
+# Texts, not Paths: maps in recordings are named by more than a file.
 MapA = Annotated[
-    str, typer.Argument(metavar="A", help="A map: YAML file of map_server or nav2, or a bare image.")
+    str,
+    typer.Argument(
+        metavar="A",
+        help="A map: YAML file of map_server or nav2, a bare image, or RECORDING#topic@seconds.",
+    ),
 ]
 MapB = Annotated[str, typer.Argument(metavar="B", help="The map to lay on A.")]
 

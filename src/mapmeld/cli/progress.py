@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
+
+T = TypeVar("T")
 
 
 @contextmanager
@@ -18,3 +21,17 @@ def working(what: str) -> Iterator[None]:
 
     with Console(stderr=True).status(Text(what)):
         yield
+
+
+def counted(items: Iterable[T], what: str) -> Iterator[T]:
+    """Give the items, and show on stderr, if that is a terminal, how many there were so far."""
+    if not sys.stderr.isatty():
+        yield from items
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    with Console(stderr=True).status(Text(what)) as status:
+        for number, item in enumerate(items, start=1):
+            status.update(Text(f"{what}: {number}"))
+            yield item

@@ -71,7 +71,7 @@ def print_lines(*lines: str) -> None:
         out.print(Text(printable(line)), soft_wrap=True)
 
 
-def _print_table(table: Table) -> None:
+def print_table(table: Table) -> None:
     """Print a table without the blanks that rich fills its lines up with."""
     out = console()
     with out.capture() as captured:
@@ -101,7 +101,7 @@ def print_match(result: MatchResult, names: Sequence[str]) -> None:
     table.add_row("similarity", Text(rounded(result.similarity, 3)))
     table.add_row("overlap", Text(rounded(result.overlap, 3)))
     table.add_row("seconds", Text(rounded(result.seconds, 3)))
-    _print_table(table)
+    print_table(table)
 
 
 def print_merge(result: MergeResult, names: Sequence[str]) -> None:
@@ -125,7 +125,7 @@ def print_merge(result: MergeResult, names: Sequence[str]) -> None:
         table.add_row(str(i + 1), Text(name), *numbers, *shown, state)
     out = console()
     out.print(Text("Transforms T_1_i: each map's frame in the frame of map 1", style="bold"))
-    _print_table(table)
+    print_table(table)
     out.print()
     out.print(Text("Start poses of the robots in the frame of map 1", style="bold"))
     for i, start in enumerate(result.starts):

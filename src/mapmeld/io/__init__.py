@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, Self
 
 from mapmeld.errors import MapmeldError
 
@@ -16,7 +16,17 @@ if TYPE_CHECKING:
 
     from mapmeld.grid import OccupancyGrid
 
-__all__ = ["FORMATS", "ImageFormat", "MapFileError", "MapFormat", "Mode", "load", "printable", "save"]
+__all__ = [
+    "FORMATS",
+    "ImageFormat",
+    "MapFileError",
+    "MapFormat",
+    "Mode",
+    "format_of",
+    "load",
+    "printable",
+    "save",
+]
 
 Mode = Literal["trinary", "scale", "raw"]
 ImageFormat = Literal["pgm", "png"]
@@ -27,7 +37,7 @@ class MapFileError(MapmeldError):
     """A map that cannot be read or written as asked; the message names the file."""
 
     @classmethod
-    def of(cls, path: AnyPath, problem: str) -> MapFileError:
+    def of(cls, path: AnyPath, problem: str) -> Self:
         """Return the error ``path: problem`` on one line, whatever characters the two hold."""
         return cls(printable(f"{os.fspath(path)}: {problem}"))
 
@@ -46,8 +56,8 @@ class MapFormat(NamedTuple):
     suffixes
         Endings (lower case, with the dot) by which a path is known to be of this kind.
     read
-        Takes the path exactly as it was given to `load` (later kinds put more than a file
-        name into it) and the resolution [m] or None.
+        Takes the path exactly as it was given to `load` (for recordings it holds more than a
+        file name) and the resolution [m] or None.
     """
 
     suffixes: tuple[str, ...]
@@ -73,10 +83,30 @@ def _read_bare_image(path: str, resolution: float | None) -> OccupancyGrid:
     return read_bare_image(path, resolution)
 
 
+def _read_recording(path: str, resolution: float | None) -> OccupancyGrid:
+    from mapmeld.io.recordings.states import read_state
+
+    if resolution is not None:
+        raise MapFileError.of(path, "states its own resolution; leave the resolution out")
+    return read_state(path)
+
+
 FORMATS: dict[str, MapFormat] = {
     "map_server": MapFormat((".yaml", ".yml"), _read_map_server),
     "image": MapFormat((".pgm", ".png", ".bmp"), _read_bare_image),
+    "recording": MapFormat((".bag", ".mcap", ".db3"), _read_recording),
 }
+
+
+def format_of(path: AnyPath) -> str | None:
+    """Return the name in `FORMATS` of the kind that a path is of; None if it does not tell."""
+    from mapmeld.io.recordings.address import is_recording
+
+    name = os.fsdecode(path)
+    if is_recording(name):
+        return "recording"
+    ending = os.path.splitext(name)[1].lower()  # noqa: PTH122  (not every path is a file name)
+    return next((kind for kind, found in FORMATS.items() if ending in found.suffixes), None)
 
 
 def load(
@@ -90,34 +120,36 @@ def load(
     Parameters
     ----------
     path
-        A ``.yaml``/``.yml`` file of ROS ``map_server`` or nav2, which names its image, or a
-        bare ``.pgm``, ``.png`` or ``.bmp`` image.
+        A ``.yaml``/``.yml`` file of ROS ``map_server`` or nav2, which names its image; a
+        bare ``.pgm``, ``.png`` or ``.bmp`` image; or a map in a recording, ``FILE#topic@time``: a
+        rosbag1 or MCAP file or a rosbag2 folder, the topic (may be left out if only one has maps),
+        and seconds since the recording began, or a stamp (if left out, the last state).
     resolution
         Side of a cell [m]. Needed for a bare image (whose lower left corner becomes the origin),
         an error for a file that states its own.
     format
-        Name of a reader in `FORMATS` ("map_server", "image"), if the path's ending does not tell.
+        Name of a reader in `FORMATS` ("map_server", "image", "recording"), if the path does not tell.
 
     Returns
     -------
     OccupancyGrid
-        Row 0 at the bottom; neither stamp nor frame, as such files record none.
+        Row 0 at the bottom; stamp and frame are those in a recording, the other files have none.
 
     Raises
     ------
     MapFileError
         The file is missing, damaged, too large, or not a map. The message is one line.
+    MissingExtraError
+        It is a recording, and the extra "bags" is not installed.
     """
     name = os.fsdecode(path)
     if format is None:
-        ending = os.path.splitext(name)[1].lower()  # noqa: PTH122  (not every path is a file name)
-        found = next((kind for kind in FORMATS.values() if ending in kind.suffixes), None)
-        if found is None:
-            if os.path.isdir(name):  # noqa: PTH112  (as above)
+        format = format_of(name)  # noqa: A001
+        if format is None:
+            if os.path.isdir(name):  # noqa: PTH112  (not every path is a file name)
                 raise MapFileError.of(name, "is a folder; name the map file in it")
             known = " ".join(suffix for kind in FORMATS.values() for suffix in kind.suffixes)
             raise MapFileError.of(name, f"not a known kind of map file (known: {known})")
-        return found.read(name, resolution)
     if format not in FORMATS:
         raise MapFileError.of(name, f"no map format is called {format!r} (there are: {', '.join(FORMATS)})")
     return FORMATS[format].read(name, resolution)

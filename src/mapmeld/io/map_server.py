@@ -220,7 +220,7 @@ def read_description(path: AnyPath) -> MapDescription:
             " are they the wrong way round?"
         )
     origin = fields.pose("origin")
-    problem = _problem_of_origin(origin, resolution)
+    problem = problem_of_origin(origin, resolution)
     if problem is not None:
         fields.fail(f"its {problem}")
     return MapDescription(
@@ -234,7 +234,7 @@ def read_description(path: AnyPath) -> MapDescription:
     )
 
 
-def _problem_of_origin(origin: Pose2, resolution: float) -> str | None:
+def problem_of_origin(origin: Pose2, resolution: float) -> str | None:
     """Return what is wrong with an origin for cells of that size [m]; None if nothing is."""
     if math.ulp(max(abs(origin.x), abs(origin.y))) > resolution / 1000:
         return (
@@ -390,7 +390,7 @@ def write_map(
         raise MapFileError.of(
             path, f"the map has {grid.cells.size:,} cells; from 1 to {MAX_CELLS:,} can be written"
         )
-    problem = _problem_of_origin(grid.origin, grid.resolution)
+    problem = problem_of_origin(grid.origin, grid.resolution)
     if problem is not None:  # the file could not be read again
         raise MapFileError.of(path, f"the map's {problem}")
     image_path = yaml_path.with_suffix(f".{image_format}")
