@@ -24,6 +24,7 @@ from mapmeld.cli.explain import explain
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.show import show
+from mapmeld.cli.slam import slam
 from mapmeld.errors import MapmeldError
 
 # The class that all complaints about the command line derive from, under the name by which it can be
@@ -146,6 +147,6 @@ def _options(
     pass
 
 
-for _command in (match, merge, show, explain, demo, benchmark):
+for _command in (match, merge, show, explain, demo, benchmark, slam):
     app.command()(_command)
 app.add_typer(bag)

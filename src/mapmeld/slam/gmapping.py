@@ -70,9 +70,7 @@ class GMapping:
         As given.
     """
 
-    def __init__(
-        self, laser: Laser, parameters: GMappingParameters | None = None, seed: int = 0
-    ) -> None:
+    def __init__(self, laser: Laser, parameters: GMappingParameters | None = None, seed: int = 0) -> None:
         """Start with nothing known.
 
         Parameters
@@ -135,7 +133,8 @@ class GMapping:
         now = scan.T_odom_base
         if scan.ranges.shape != (self.laser.beams,):
             raise ScanError(
-                f"the scan at {scan.stamp:.3f} s has {scan.ranges.size} ranges; the laser has {self.laser.beams} beams"
+                f"the scan at {scan.stamp:.3f} s has {scan.ranges.size} ranges; "
+                f"the laser has {self.laser.beams} beams"
             )
         if not all(map(math.isfinite, (now.x, now.y, now.theta, scan.stamp))):
             raise ScanError(f"the scan at {scan.stamp:.3f} s has no finite odometry: {now}")
@@ -216,7 +215,7 @@ class GMapping:
                 likelihoods[number] = self._likelihoods(number, poses[number][None], beams)[0]
         self._poses = maps.metres(poses)
         if p.proposal == "sampled":
-            for number in np.flatnonzero(~failed):
+            for number in map(int, np.flatnonzero(~failed)):
                 self._poses[number], likelihoods[number] = self._draw(number, beams)
         self._weights += likelihoods
         self._totals += likelihoods
@@ -239,9 +238,7 @@ class GMapping:
         motion = self._used_odometry.inverse() @ self._odometry
         expected = moved(self._past_poses[-1][number][None], np.array([motion.x, motion.y, motion.theta]))[0]
         # Odometry cannot be trusted to less than the distance of the samples.
-        spread = np.maximum(
-            motion_noise(motion, p), (p.llsamplestep, p.llsamplestep, p.lasamplestep)
-        )
+        spread = np.maximum(motion_noise(motion, p), (p.llsamplestep, p.llsamplestep, p.lasamplestep))
         around = self._poses[number] + _offsets(p)
         difference = around - expected
         c, s = math.cos(self._past_poses[-1][number][2]), math.sin(self._past_poses[-1][number][2])
@@ -283,17 +280,23 @@ class GMapping:
         """T_map_base at the last scan, whether it was used or not."""
         return self.T_map_odom @ (self._odometry or Pose2())
 
-    def map(self) -> OccupancyGrid:
-        """Return the best particle's map, cut to what is known: cells 0, 100 and -1, as the node publishes it.
+    @property
+    def has_map(self) -> bool:
+        """Whether any scan with a valid beam was used yet."""
+        return bool(self._maps.tables[self.best].any())
 
-        Its stamp is that of the last scan in it.
+    def map(self) -> OccupancyGrid:
+        """Return the best particle's map, cut to what is known.
+
+        Its cells are 0, 100 and -1, as the node publishes them. Its stamp is that of the last scan in it.
 
         Raises
         ------
         ValueError
-            No scan was added yet, or none with a valid beam.
+            `has_map` is not true yet.
         """
-        return self._maps.grid(self.best, self.parameters.occ_thresh, self._stamps[-1] if self._stamps else None)
+        stamp = self._stamps[-1] if self._stamps else None
+        return self._maps.grid(self.best, self.parameters.occ_thresh, stamp)
 
     def trajectory(self) -> Trajectory:
         """Return the best particle's whole path: T_map_base at every scan that was used."""
@@ -316,3 +319,20 @@ def _offsets(p: GMappingParameters) -> Floats:
         )
     )
     return np.stack(np.meshgrid(line, line, turn, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def prepare() -> None:
+    """Have the inner loops compiled now, which takes a while the first time after an installation.
+
+    Otherwise the first scans wait for it. The outcome is kept on disk for later runs.
+
+    Raises
+    ------
+    MissingExtraError
+        numba is not installed.
+    """
+    parameters = GMappingParameters(particles=2, linearUpdate=0.0, proposal="sampled")
+    slam = GMapping(Laser(8, -1.0, 0.25, 5.0), parameters)
+    ranges = np.full(8, 1.0, np.float32)
+    for stamp in range(2):
+        slam.add(Scan(float(stamp), Pose2(), ranges))

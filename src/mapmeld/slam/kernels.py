@@ -54,8 +54,8 @@ class Sensor(NamedTuple):
 @compiled
 def _window(walls: Bits, table: Ids, row: int, col: int) -> int:
     """Return which of the cells from `col` to the right are wall: cell `col` is the lowest bit."""
-    here = walls[table[row >> PATCH_BITS, col >> PATCH_BITS], row & _LOW]
-    beside = walls[table[row >> PATCH_BITS, (col >> PATCH_BITS) + 1], row & _LOW]
+    here: int = walls[table[row >> PATCH_BITS, col >> PATCH_BITS], row & _LOW]
+    beside: int = walls[table[row >> PATCH_BITS, (col >> PATCH_BITS) + 1], row & _LOW]
     return (here | (beside << PATCH)) >> (col & _LOW)
 
 
@@ -184,9 +184,7 @@ def likelihoods_around(
     """Return the log-likelihood (n,) of a scan at each pose (n, 3) on one map."""
     found = np.empty(poses.shape[0])
     for n in range(poses.shape[0]):
-        found[n] = evaluate(
-            cells, walls, table, poses[n, 0], poses[n, 1], poses[n, 2], ends, sensor, -1.0
-        )[1]
+        found[n] = evaluate(cells, walls, table, poses[n, 0], poses[n, 1], poses[n, 2], ends, sensor, -1.0)[1]
     return found
 
 

@@ -42,7 +42,7 @@ def moved(poses: Floats, motions: Floats) -> Floats:
 def sample_motion(
     poses: Floats, T_old_new: Pose2, parameters: GMappingParameters, rng: np.random.Generator
 ) -> Floats:
-    """Return the poses (n, 3) [m, m, rad] after a motion as odometry reports it, each with noise of its own."""
+    """Return the poses (n, 3) [m, m, rad] after a motion that odometry reports, with noise for each."""
     mean = np.array([T_old_new.x, T_old_new.y, T_old_new.theta])
     noise = motion_noise(T_old_new, parameters)
     return moved(poses, mean + noise * rng.standard_normal(poses.shape))

@@ -114,7 +114,9 @@ class GMappingParameters:
         if self.maxUrange is not None and math.isinf(self.maxUrange):
             raise ValueError("maxUrange must be finite: it is how far beams are drawn")
         if self.maxUrange is None and self.maxRange is not None and math.isinf(self.maxRange):
-            raise ValueError("without an end of maxRange, maxUrange has to be set: it is how far beams are drawn")
+            raise ValueError(
+                "without an end of maxRange, maxUrange has to be set: it is how far beams are drawn"
+            )
 
 
 _POSITIVE = (

@@ -38,4 +38,4 @@ def low_variance(weights: Floats, offset: float) -> NDArray[np.intp]:
     n = len(weights)
     ends = np.cumsum(weights)
     steps = (offset + np.arange(n)) / n * ends[-1]
-    return np.minimum(np.searchsorted(ends, steps, side="right"), n - 1)
+    return np.asarray(np.minimum(np.searchsorted(ends, steps, side="right"), n - 1), np.intp)

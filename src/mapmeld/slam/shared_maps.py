@@ -60,11 +60,13 @@ class SharedMaps:
     # ------------------------------------------------------------------ metres <-> lattice of the tables
     def lattice(self, poses: Floats) -> Floats:
         """Take poses (n, 3) [m, m, rad] to lattice coordinates of the tables [cells, cells, rad]."""
-        return poses / (self.delta, self.delta, 1.0) - (*self.corner, 0.0)
+        scale = np.array([self.delta, self.delta, 1.0])
+        return np.asarray(poses / scale - np.array([*self.corner, 0.0]), np.float64)
 
     def metres(self, poses: Floats) -> Floats:
         """Take poses (n, 3) from lattice coordinates of the tables to [m, m, rad]."""
-        return (poses + (*self.corner, 0.0)) * (self.delta, self.delta, 1.0)
+        scale = np.array([self.delta, self.delta, 1.0])
+        return np.asarray((poses + np.array([*self.corner, 0.0])) * scale, np.float64)
 
     # ------------------------------------------------------------------ room
     def reach(self, low: tuple[float, float], high: tuple[float, float]) -> None:
@@ -90,8 +92,8 @@ class SharedMaps:
         )
         if max(new[2] - new[0], new[3] - new[1]) > MAX_SIDE:
             raise MapTooLargeError(
-                f"the map would have to reach from ({low[0]:.6g}, {low[1]:.6g}) to ({high[0]:.6g}, {high[1]:.6g}) "
-                "m: the odometry jumps"
+                f"the map would have to reach from ({low[0]:.6g}, {low[1]:.6g}) to "
+                f"({high[0]:.6g}, {high[1]:.6g}) m: the odometry jumps"
             )
         pad = ((0, 0), (bottom - new[1], new[3] - bottom - rows), (left - new[0], new[2] - left - cols))
         if any(max(p) for p in pad):
@@ -115,9 +117,7 @@ class SharedMaps:
         self._spares += more
 
     # ------------------------------------------------------------------ changes
-    def enter(
-        self, number: int, pose: Floats, start: Floats, ends: Floats, hits: NDArray[np.bool_]
-    ) -> None:
+    def enter(self, number: int, pose: Floats, start: Floats, ends: Floats, hits: NDArray[np.bool_]) -> None:
         """Enter a scan into one map.
 
         Parameters

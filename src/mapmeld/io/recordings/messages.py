@@ -78,7 +78,7 @@ def grid_of(data: bytes, encoding: str, received: int) -> OccupancyGrid | None:
     BadMessageError
         It cannot be decoded, or it is no map.
     """
-    message = _decoded(data, GRID, encoding)
+    message = decoded(data, GRID, encoding)
     info = message.info
     rows, cols = int(info.height), int(info.width)
     cells = _cells_of(message.data, rows, cols)
@@ -95,15 +95,15 @@ def grid_of(data: bytes, encoding: str, received: int) -> OccupancyGrid | None:
     if problem is not None:
         raise BadMessageError(f"a map whose {problem}")
     return OccupancyGrid(
-        cells, resolution, origin, _stamp_of(message.header, received), str(message.header.frame_id)
+        cells, resolution, origin, stamp_of(message.header, received), str(message.header.frame_id)
     )
 
 
 def patch_of(data: bytes, encoding: str, received: int) -> Patch:
     """Return the patch in an OccupancyGridUpdate message; parameters and errors as of `grid_of`."""
-    message = _decoded(data, UPDATE, encoding)
+    message = decoded(data, UPDATE, encoding)
     cells = _cells_of(message.data, int(message.height), int(message.width))
-    return Patch(int(message.y), int(message.x), cells, _stamp_of(message.header, received))
+    return Patch(int(message.y), int(message.x), cells, stamp_of(message.header, received))
 
 
 def patched(grid: OccupancyGrid, patch: Patch) -> OccupancyGrid | None:
@@ -143,7 +143,8 @@ def _yaw_of(turn: Any) -> float:
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-def _stamp_of(header: Any, received: int) -> float:
+def stamp_of(header: Any, received: int) -> float:
+    """Return the stamp of a header [s]; where that is zero, when the message was received [ns]."""
     nanoseconds = int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec)
     return seconds(nanoseconds or received)
 
@@ -154,13 +155,20 @@ def seconds(nanoseconds: int) -> float:
 
 
 # ---------------------------------------------------------------------- decoding
-def _decoded(data: bytes, kind: str, encoding: str) -> Any:
+def decoded(data: bytes, kind: str, encoding: str, what: str = "map") -> Any:
+    """Return a message of one of the types that ROS brings along, as the library rosbags has it.
+
+    Raises
+    ------
+    BadMessageError
+        It cannot be decoded; the message names `what` it should have been.
+    """
     store = _store(encoding)
     decode = store.deserialize_cdr if encoding == CDR else store.deserialize_ros1
     try:
         return decode(data, kind)
     except Exception as error:  # whatever the library trips over: the bytes are to blame
-        raise BadMessageError("bytes that are no map") from error
+        raise BadMessageError(f"bytes that are no {what}") from error
 
 
 @cache
