@@ -73,7 +73,7 @@ def slam(
     from mapmeld.extras import required
     from mapmeld.io import save
     from mapmeld.io.folders import check_folder, whole_folder
-    from mapmeld.io.history_writer import write_history
+    from mapmeld.io.history_writer import history_files, write_history
     from mapmeld.io.scans import open_scans
 
     required("numba", "sim")
@@ -86,7 +86,7 @@ def slam(
     with working("Getting ready (the first time, code has to be compiled)"):
         prepare()
     mapper = GMapping(stream.laser, parameters, seed)
-    earlier = [str(path.relative_to(out)) for path in (out / HISTORY).glob("*") if path.is_file()]
+    earlier = [f"{HISTORY}/{name}" for name in history_files(out / HISTORY)]
     with whole_folder(out, force=force, ours=(*_OURS, *earlier)) as folder:
         scans = counted(stream.scans, "Mapping, scans")
         maps = 0

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, get_type_hints
 
 from mapmeld.errors import MapmeldError
 from mapmeld.io import AnyPath, MapFileError
-from mapmeld.io.plain_yaml import Nested, read_fields, short
+from mapmeld.io.plain_yaml import read_fields, short
 from mapmeld.slam.parameters import GMappingParameters
 
 NODE_ONLY = frozenset(
@@ -60,19 +60,19 @@ def read_parameters(path: AnyPath) -> ParameterFile:
         found = read_fields(path, "a file of parameters", depth=_DEPTH, may_be_empty=True)
     except MapFileError as error:
         raise ParameterFileError(str(error)) from error
-    values: Any = {}
+    values: Mapping[Any, Any] = {}
     if found:
         import yaml
 
-        # Known by now to be small, flat, and without aliases and tags.
-        values = yaml.safe_load(Path(path).read_text(encoding="utf-8").split("\n---", 1)[0])
-    while len(values) == 1 and isinstance(next(iter(found.values()), None), Nested):
-        (values,) = values.values()
-        if not isinstance(values, Mapping):
-            raise ParameterFileError(f"{path}: has no 'name: value' lines")
-        found = {name: Nested() for name, value in values.items() if isinstance(value, Mapping)}
+        # Known by now to be small, without aliases and tags, and not to be nested deep.
+        values = next(yaml.safe_load_all(Path(path).read_text(encoding="utf-8")))
     known = get_type_hints(GMappingParameters)
     names = [field.name for field in fields(GMappingParameters)]
+    while len(values) == 1:
+        ((name, inner),) = values.items()
+        if name in names or not isinstance(inner, Mapping):
+            break
+        values = inner
     settings: dict[str, Any] = {}
     for name, value in values.items():
         if name in NODE_ONLY:

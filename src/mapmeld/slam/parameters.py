@@ -115,7 +115,7 @@ class GMappingParameters:
             raise ValueError("maxUrange must be finite: it is how far beams are drawn")
         if self.maxUrange is None and self.maxRange is not None and math.isinf(self.maxRange):
             raise ValueError(
-                "without an end of maxRange, maxUrange has to be set: it is how far beams are drawn"
+                "maxUrange has to be set where maxRange is infinite: it is how far beams are drawn"
             )
 
 

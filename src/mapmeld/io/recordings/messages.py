@@ -26,8 +26,12 @@ CDR, ROS1 = "cdr", "ros1"
 ENCODINGS = (CDR, ROS1)
 """The ways of writing messages that are read: those of ROS 2 and of ROS 1."""
 
-# The type stores of rosbags lack it; the same in ROS 1 and ROS 2.
+# What the type stores of rosbags lack, one or both; the same in ROS 1 and ROS 2.
 _UPDATE_DEFINITION = "std_msgs/Header header\nint32 x\nint32 y\nuint32 width\nuint32 height\nint8[] data\n"
+
+
+_FRAMES_DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
+TF = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
 class RecordingError(MapFileError):
@@ -173,12 +177,15 @@ def decoded(data: bytes, kind: str, encoding: str, what: str = "map") -> Any:
 
 @cache
 def _store(encoding: str) -> Any:
-    """Return what knows the two types; their definitions in the recording are not looked at.
+    """Return what knows the types that are read; their definitions in the recording are not looked at.
 
-    They have never changed, and a recording's other types shall not get in the way.
+    They have hardly ever changed, and a recording's other types shall not get in the way.
     """
     typesys = required("rosbags.typesys", EXTRA)
     stores = typesys.Stores
     store = typesys.get_typestore(stores.ROS1_NOETIC if encoding == ROS1 else stores.ROS2_HUMBLE)
     store.register(typesys.get_types_from_msg(_UPDATE_DEFINITION, UPDATE))
+    for name in TF:
+        if name not in store.types:
+            store.register(typesys.get_types_from_msg(_FRAMES_DEFINITION, name))
     return store

@@ -16,6 +16,7 @@ from mapmeld.io.odometry import OdometryTrack
 from mapmeld.io.recordings.frames import Frames, frame_name, level_pose, matrix_of
 from mapmeld.io.recordings.messages import (
     ENCODINGS,
+    TF,
     BadMessageError,
     RecordingError,
     decoded,
@@ -30,7 +31,6 @@ from mapmeld.se2 import Pose2
 
 SCAN = "sensor_msgs/msg/LaserScan"
 ODOMETRY = "nav_msgs/msg/Odometry"
-TF = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 ODOM_FRAME = "odom"
 """The frame whose child is the robot, where odometry is on /tf alone."""
 
