@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -119,6 +120,14 @@ def test_bad_logs_leave_nothing_behind(
     assert done.code == 2
     assert problem in done.line
     assert files(tmp_path) == ["bad.log"]
+
+
+def test_without_numba_the_extra_is_named(log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "numba", None)
+    done = run("slam", log, "-o", tmp_path / "out")
+    assert done.code == 2
+    assert 'pip install "mapmeld[sim]"' in done.line
+    assert files(tmp_path) == []
 
 
 def test_what_was_passed_over_is_said(log: Path, tmp_path: Path) -> None:

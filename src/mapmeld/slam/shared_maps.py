@@ -18,7 +18,7 @@ from mapmeld.se2 import Pose2
 from mapmeld.slam.kernels import PATCH, Bits, Cells, Floats, Ids, register
 
 MAX_SIDE = 1 << 11
-"""Most patches along one side of a map; what is larger comes from a jump of the odometry."""
+"""Most patches along one side of a map; what is larger comes from an error, and would not fit into memory."""
 
 
 class MapTooLargeError(MapmeldError):
@@ -93,7 +93,8 @@ class SharedMaps:
         if max(new[2] - new[0], new[3] - new[1]) > MAX_SIDE:
             raise MapTooLargeError(
                 f"the map would have to reach from ({low[0]:.6g}, {low[1]:.6g}) to "
-                f"({high[0]:.6g}, {high[1]:.6g}) m: the odometry jumps"
+                f"({high[0]:.6g}, {high[1]:.6g}) m, more than {MAX_SIDE * PATCH} cells: the odometry jumps, "
+                "a range is wrong, or delta is too small"
             )
         pad = ((0, 0), (bottom - new[1], new[3] - bottom - rows), (left - new[0], new[2] - left - cols))
         if any(max(p) for p in pad):
