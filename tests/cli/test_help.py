@@ -26,6 +26,7 @@ COMMANDS = (
     "benchmark",
     "environment",
     "simulate",
+    "slam",
     "bag",
 )
 

@@ -30,6 +30,7 @@ from mapmeld.cli.merge import merge
 from mapmeld.cli.rebase import rebase
 from mapmeld.cli.show import show
 from mapmeld.cli.simulate import simulate
+from mapmeld.cli.slam import slam
 from mapmeld.cli.transform_points import transform_points
 from mapmeld.errors import MapmeldError
 
@@ -155,7 +156,7 @@ def _options(
 
 for _command in (
     match, merge, graph, follow, diff, rebase, transform_points, show, explain, demo, benchmark,
-    environment, simulate,
+    environment, simulate, slam,
 ):  # fmt: skip
     app.command()(_command)
 app.add_typer(bag)

@@ -53,8 +53,7 @@ def write_history(
         The folder is not empty (and `force` is not set) or cannot be written.
     """
     target = Path(folder)
-    earlier = [name for name in _names_in(target) if _OURS.fullmatch(name)]
-    with whole_folder(target, force=force, ours=earlier) as temporary:
+    with whole_folder(target, force=force, ours=history_files(target)) as temporary:
         lines = ["# map  stamp [s]"]
         frame = None
         for number, grid in enumerate(states):
@@ -79,8 +78,9 @@ def state_name(number: int) -> str:
     return f"state_{number:05}.yaml"
 
 
-def _names_in(folder: Path) -> list[str]:
+def history_files(folder: AnyPath) -> list[str]:
+    """Return the names of the files in a folder that are called as those of a history are."""
     try:
-        return os.listdir(folder)  # noqa: PTH208  (names, not paths)
+        return [name for name in os.listdir(folder) if _OURS.fullmatch(name)]  # noqa: PTH208  (names)
     except OSError:  # none yet; what else may be wrong is said when it is written
         return []
