@@ -173,8 +173,11 @@ def test_names_that_are_no_text_can_be_printed(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="such file names are not to be had on Windows")
-def test_a_name_with_a_line_end_does_not_break_the_table(tmp_path: Path) -> None:
-    folder = tmp_path / "two\nlines \x1b[31m"
+def test_a_name_with_a_line_end_does_not_break_the_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # a short path: a long one would be broken to fit the terminal
+    folder = Path("two\nlines \x1b[31m")
     folder.mkdir()
     a, b = write_maps(folder, "a", "b")
     outcome = run("match", a, b)

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from mapmeld.errors import MapmeldError
 from mapmeld.io.carmen import carmen_scans
-from mapmeld.io.scans import ScanFileError, open_scans
+from mapmeld.io.scan_stream import ScanFileError
+from mapmeld.io.scans import open_scans
 from mapmeld.se2 import Pose2
 
 FLASER = "FLASER 3 1.00 2.50 81.91 9 9 9 0.5 0.25 0.1 {time} host 12.0\n"

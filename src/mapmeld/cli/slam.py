@@ -127,7 +127,7 @@ def _states(mapper: GMapping, scans: Iterable[Scan], every: float, file: str) ->
 
 
 def _check(mapper: GMapping, file: str) -> None:
-    from mapmeld.io.scans import ScanFileError
+    from mapmeld.io.scan_stream import ScanFileError
 
     if not mapper.has_map:
         raise ScanFileError.of(file, "has no scan from which a map could be made")

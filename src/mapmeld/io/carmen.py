@@ -16,7 +16,7 @@ import numpy as np
 
 from mapmeld.io import AnyPath
 from mapmeld.io.images import open_regular
-from mapmeld.io.scans import ScanFileError, ScanStream
+from mapmeld.io.scan_stream import ScanFileError, ScanStream
 from mapmeld.recording import Laser, Scan
 from mapmeld.se2 import Pose2
 

@@ -3,37 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
 
-from mapmeld.io import AnyPath, MapFileError
+from mapmeld.io import AnyPath
 from mapmeld.io.images import open_regular
-from mapmeld.recording import Laser, Scan
-
-
-class ScanFileError(MapFileError):
-    """A file whose scans cannot be read; the message names it."""
-
-
-@dataclass(frozen=True, slots=True)
-class ScanStream:
-    """The scans of a file, read as they are asked for.
-
-    Attributes
-    ----------
-    laser
-        What they come from.
-    scans
-        In time order; can be gone through once.
-    left_out
-        What was passed over so far, and how often; grows while scans are taken.
-    """
-
-    laser: Laser
-    scans: Iterator[Scan]
-    left_out: Counter[str]
-
+from mapmeld.io.scan_stream import ScanFileError, ScanStream
 
 _RECORDINGS = (b"\x89MCAP", b"#ROSBAG", b"SQLite format 3")
 

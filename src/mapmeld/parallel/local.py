@@ -12,7 +12,7 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
-from mapmeld.parallel.jobs import RESTARTS, Job, WorkerDiedError, filled
+from mapmeld.parallel.job import RESTARTS, Job, WorkerDiedError, filled
 
 R = TypeVar("R")
 

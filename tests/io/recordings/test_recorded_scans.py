@@ -17,7 +17,8 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from mapmeld.io.recordings import RecordingError
-from mapmeld.io.scans import ScanStream, open_scans
+from mapmeld.io.scan_stream import ScanStream
+from mapmeld.io.scans import open_scans
 from mapmeld.se2 import Pose2
 
 SCAN, ODOMETRY, TF = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"

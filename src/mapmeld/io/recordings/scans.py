@@ -25,7 +25,7 @@ from mapmeld.io.recordings.messages import (
 )
 from mapmeld.io.recordings.opening import open_recording
 from mapmeld.io.recordings.source import Channel, Message, Source
-from mapmeld.io.scans import ScanStream
+from mapmeld.io.scan_stream import ScanStream
 from mapmeld.recording import Laser, Scan
 from mapmeld.se2 import Pose2
 
