@@ -22,6 +22,7 @@ from mapmeld.errors import MapmeldError
 from mapmeld.grid import OccupancyGrid
 from mapmeld.io.recordings import RecordingError, folder_scan, map_states, recording_info
 from mapmeld.io.recordings.source import reason_of
+from mapmeld.io.recordings.unpacking import MAX_PIECE_BYTES, unpacked
 
 TOPIC = "/robot_1/map"
 
@@ -134,6 +135,17 @@ def test_of_a_recording_cut_in_the_middle_the_first_half_can_be_used(name: str, 
     info = recording_info(path, damaged="use")
     assert [topic.maps for topic in info.topics] == [len(found)]
     assert info.left_out
+
+
+def test_any_byte_of_a_summary_that_is_wrong_is_noticed(tmp_path: Path) -> None:
+    data = mcap_bytes(story())
+    path = tmp_path / "run.mcap"
+    begin = int.from_bytes(data[-28:-20], "little")  # of the footer: where the summary begins
+    assert 0 < begin < len(data) - 200
+    for at in range(begin, len(data) - 29, 5):
+        path.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
+        with pytest.raises(RecordingError):
+            map_states(path, TOPIC)
 
 
 def test_packed_as_a_whole_and_cut_off(tmp_path: Path) -> None:
@@ -326,6 +338,12 @@ def _chunks(compression: str, data: bytes, declared: int) -> Iterator[bytes]:
     ).write(builder)
     yield begin
     yield builder.end()  # type: ignore[no-untyped-call]
+
+
+@pytest.mark.parametrize("compression", ["", "bz2", "lz4", "zstd"])
+def test_a_piece_that_says_it_is_larger_than_any_is_not_unpacked(compression: str) -> None:
+    with pytest.raises(ValueError, match="more than the"):
+        unpacked(b"", compression, MAX_PIECE_BYTES + 1)
 
 
 @pytest.mark.parametrize("declared", [1000, 10**8, 10**10, 2**63])
