@@ -27,6 +27,7 @@ from mapmeld.cli.graph import graph
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.rebase import rebase
+from mapmeld.cli.settings_help import WithSettings
 from mapmeld.cli.show import show
 from mapmeld.cli.transform_points import transform_points
 from mapmeld.errors import MapmeldError
@@ -151,8 +152,8 @@ def _options(
     pass
 
 
-for _command in (
-    match, merge, graph, follow, diff, rebase, transform_points, show, explain, demo, benchmark,
-):  # fmt: skip
-    app.command()(_command)
+for _command in (match, merge, graph, follow, diff, rebase, transform_points, show, explain):
+    app.command(cls=WithSettings)(_command)
+app.command()(demo)
+app.command()(benchmark)
 app.add_typer(bag)
