@@ -85,9 +85,9 @@ def test_the_displacement_is_linear_between_nodes_and_held_outside(
 @given(st.from_type(Pose2), st.from_type(Pose2))
 def test_what_is_laid_down_comes_from_where_the_displacement_says(frame: Pose2, corner: Pose2) -> None:
     """Whatever turn the lattice has, and the frame in which the displacement is told."""
-    pattern = np.add.outer(7 * np.arange(40), 3 * np.arange(60)).astype(np.int64) % 101
+    pattern = np.add.outer(7 * np.arange(40), 3 * np.arange(60)) % 101
     lattice = OccupancyGrid(np.full((40, 60), -1, np.int8), 0.25, corner)
-    new = OccupancyGrid(pattern, 0.25, corner)
+    new = OccupancyGrid(pattern.astype(np.int8), 0.25, corner)
     bending = Bending(frame, 0j, 1.0, np.array([[1.5 + 0.5j, 1.5 + 0.5j], [1.5 + 0.5j, 1.5 + 0.5j]]))
     laid = bending.laid(new, Pose2(), lattice)
     shift = Pose2(0.0, 0.0, frame.theta).apply((1.5, 0.5))

@@ -28,6 +28,7 @@ from mapmeld.cli.graph import graph
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.rebase import rebase
+from mapmeld.cli.settings_help import WithSettings
 from mapmeld.cli.show import show
 from mapmeld.cli.simulate import simulate
 from mapmeld.cli.slam import slam
@@ -154,9 +155,8 @@ def _options(
     pass
 
 
-for _command in (
-    match, merge, graph, follow, diff, rebase, transform_points, show, explain, demo, benchmark,
-    environment, simulate, slam,
-):  # fmt: skip
+for _command in (match, merge, graph, follow, diff, rebase, transform_points, show, explain):
+    app.command(cls=WithSettings)(_command)
+for _command in (demo, benchmark, environment, simulate, slam):
     app.command()(_command)
 app.add_typer(bag)
