@@ -13,7 +13,7 @@ import numpy as np
 
 from mapmeld.grid import OccupancyGrid
 from mapmeld.matching.correlative.alignment import refine, to_local, to_metric, turn_and_shift
-from mapmeld.matching.correlative.covariance import of_inverse, transform_covariance
+from mapmeld.matching.correlative.covariance import best_fit, of_inverse
 from mapmeld.matching.correlative.evidence import HIT, Evidence, quick_scores, weigh
 from mapmeld.matching.correlative.parameters import CorrelativeParameters
 from mapmeld.matching.correlative.prepared_map import PreparedMap, prepare
@@ -236,14 +236,15 @@ def _answer(
     else:
         verdict = Verdict.REJECTED
         reason += ": not enough to be sure"
+    fitted, covariance = best_fit(walls_a, walls_b, best.unbent, best.overlap)
     return MatchResult(
-        T_a_b=to_metric(walls_a, walls_b, modes[0].local),
+        T_a_b=to_metric(walls_a, walls_b, fitted),
         verdict=verdict,
         reason=reason,
         probability=float(probabilities[0]),
         similarity=_similarity(walls_a, walls_b, best),
         overlap=min(1.0, best.overlap),
-        covariance=transform_covariance(walls_a, walls_b, modes[0].local, best.bend),
+        covariance=covariance,
         alternatives=tuple(
             Alternative(
                 to_metric(walls_a, walls_b, mode.local),
