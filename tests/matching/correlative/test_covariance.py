@@ -58,7 +58,7 @@ def normalised_error(seed: int, metres: float, shared: float) -> float | None:
     rng = np.random.default_rng(seed)
     place = (FINE, school(0.02))[seed % 2]
     u_a, u_b = (drift(place, metres, 3.0, rng) for _ in range(2))
-    T_a, T_b = (Pose2(*rng.uniform(-5, 5, 2), rng.uniform(-3, 3)) for _ in range(2))
+    T_a, T_b = (Pose2(*map(float, rng.uniform(-4, 4, 3))) for _ in range(2))
     upright = bool(rng.integers(2))
     seen_a, seen_b = part(place, 0, shared, upright), part(place, 1 - shared, 1, upright)
     truth = best_transform(part(seen_a, 1 - shared, 1, upright), u_a, T_a, u_b, T_b)

@@ -221,15 +221,12 @@ def _answer(
     walls_a: WallMap, walls_b: WallMap, modes: Sequence[Mode], probabilities: Doubles, accept: float
 ) -> MatchResult:
     best = modes[0].evidence
-    reason = (
-        f"of {best.wall:.0f} m of wall in the overlap the other map explains "
-        f"{100 * best.hit_bent / best.wall:.0f} % and contradicts {100 * best.contra / best.wall:.1f} %"
-    )
+    reason = _in_words(best)
     if probabilities[0] >= accept:
         verdict = Verdict.ACCEPTED
     elif best.weak < FIXED_LEAST and _enough(best) / (1 + math.exp(-modes[0].score)) > 0.5:
         verdict = Verdict.AMBIGUOUS
-        reason += f"; only {best.weak:.1f} m of it fix the place along the others"
+        reason += f"; only {best.weak:.1f} m of wall fix the place along the others"
     elif probabilities.sum() >= accept:
         verdict = Verdict.AMBIGUOUS
         reason += "; another transform explains the maps about as well"
@@ -253,6 +250,15 @@ def _answer(
             )
             for mode, probability in zip(modes[1:], probabilities[1:], strict=True)
         ),
+    )
+
+
+def _in_words(found: Evidence) -> str:
+    if found.wall < 1:
+        return "next to no wall of either map lies where the other map knows anything"
+    return (
+        f"of {found.wall:.0f} m of wall in the overlap the other map explains "
+        f"{100 * found.hit_bent / found.wall:.0f} % and contradicts {100 * found.contra / found.wall:.1f} %"
     )
 
 
