@@ -338,3 +338,10 @@ def test_one_hypothesis_has_no_alternatives() -> None:
     result = match_correlative(A, seen_from(A, B_T), CorrelativeParameters(hypotheses=1))
     assert_found(result, B_T.inverse())
     assert result.alternatives == ()
+
+
+def test_where_the_walls_do_not_meet_nothing_is_said_of_shares() -> None:
+    bare = OccupancyGrid(cells_with(UNKNOWN, (0, 0), (59, 59)), 0.05)
+    result = mapmeld.match(bare, bare)
+    assert "of 0 m" not in result.reason
+    assert "next to no wall" in result.reason or "nothing to match on" in result.reason
