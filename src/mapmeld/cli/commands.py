@@ -27,6 +27,7 @@ from mapmeld.cli.follow import follow
 from mapmeld.cli.graph import graph
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
+from mapmeld.cli.navigability import navigability
 from mapmeld.cli.rebase import rebase
 from mapmeld.cli.show import show
 from mapmeld.cli.simulate import simulate
@@ -155,7 +156,7 @@ def _options(
 
 
 for _command in (
-    match, merge, graph, follow, diff, rebase, transform_points, show, explain, demo, benchmark,
+    match, merge, graph, follow, diff, rebase, transform_points, show, explain, navigability, demo, benchmark,
     environment, simulate, slam,
 ):  # fmt: skip
     app.command()(_command)
