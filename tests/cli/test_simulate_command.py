@@ -1,3 +1,5 @@
+import json
+import math
 import os
 import pty
 import re
@@ -8,6 +10,7 @@ import sys
 import termios
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from listing import contents
@@ -76,6 +79,65 @@ def test_several_robots() -> None:
     assert {"/robot_1/scan", "/robot_2/scan"} <= set(topics("run.mcap"))
 
 
+def test_robots_that_map_on_the_way_are_followed() -> None:
+    Path("few.yaml").write_text("slam_gmapping: {particles: 3, base_frame: base}\n")
+    outcome = run(
+        "simulate", "--seed", 5, "--size", "14x12", "-o", "run.mcap", "--robots", 2, "--slam", "--duration", 20,
+        "--slam-params", "few.yaml",
+    )  # fmt: skip
+    assert outcome.code == 0
+    assert "base_frame" in outcome.line
+    found = topics("run.mcap")
+    count = found["/robot_1/map"], found["/robot_2/map"]
+    assert min(count) >= 8
+    assert f"{sum(count)} maps)" in outcome.out
+    with AnyReader([Path("run.mcap")]) as reader:
+        maps = [c for c in reader.connections if c.topic == "/robot_2/map"]
+        stamps = [content(reader, c, raw).header for c, _, raw in reader.messages(maps)]
+        # No more than one in a second, each of the second before.
+        seconds = [h.stamp.sec + h.stamp.nanosec / 1e9 for h in stamps]
+        times = [t / 1e9 for _, t, _ in reader.messages(maps)]
+        assert {h.frame_id for h in stamps} == {"robot_2/map"}
+        assert len({int(s) for s in seconds}) == len(seconds)
+        assert all(0 <= t - s <= 1.0 for t, s in zip(times, seconds, strict=True))
+        frames = set()
+        for c, _, raw in reader.messages([c for c in reader.connections if c.topic == "/tf"]):
+            frames |= {(t.header.frame_id, t.child_frame_id) for t in content(reader, c, raw).transforms}
+    assert ("robot_2/map", "robot_2/odom") in frames
+    followed = run("follow", "run.mcap", "--json")
+    assert followed.code == 0, followed.err
+    last = json.loads(followed.out.splitlines()[-1])
+    assert last["standing"] == "accepted"
+    starts = true_starts("run.mcap")
+    off, turned = (starts[0].inverse() @ starts[1]).distance_to(Pose2(**last["T_1_2"]))
+    assert off < 0.2
+    assert turned < 0.05
+
+
+def content(reader: AnyReader, connection: Any, raw: bytes) -> Any:
+    return reader.deserialize(raw, connection.msgtype)
+
+
+def true_starts(path: str) -> list[Pose2]:
+    found: dict[str, Pose2] = {}
+    with AnyReader([Path(path)]) as reader:
+        for c, _, raw in reader.messages(
+            [c for c in reader.connections if c.topic.endswith("/ground_truth")]
+        ):
+            if c.topic not in found:
+                pose = content(reader, c, raw).pose
+                turn = 2 * math.atan2(pose.orientation.z, pose.orientation.w)
+                found[c.topic] = Pose2(pose.position.x, pose.position.y, turn)
+    return [found[topic] for topic in sorted(found)]
+
+
+def test_exploration_on_the_own_map() -> None:
+    simulated("--drive", "frontier", "--duration", 3, "--slam")
+    found = topics("run.mcap")
+    assert 1 <= found["/map"] <= 4
+    assert found["/tf"] == 2 * found["/odom"]
+
+
 def test_exploration() -> None:
     said = simulated("--drive", "frontier", "--duration", 3)
     assert "Simulated 3.0 s" in said
@@ -129,6 +191,9 @@ def test_a_recording_is_a_route() -> None:
         (["--duration", "nan"], "--duration"),
         (["--size", "9x9"], "--size"),
         (["--mapping", "0"], "--mapping"),
+        (["--slam-params", "few.yaml"], "--slam"),
+        (["--slam", "--slam-params", "nowhere.yaml"], "nowhere.yaml"),
+        (["--slam", "--slam-params", "map.txt"], "map.txt"),
     ],
 )
 def test_bad_input_is_one_line(options: list[str], said: str, place: Path) -> None:

@@ -27,6 +27,7 @@ from mapmeld.cli.follow import follow
 from mapmeld.cli.graph import graph
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
+from mapmeld.cli.navigability import navigability
 from mapmeld.cli.rebase import rebase
 from mapmeld.cli.settings_help import WithSettings
 from mapmeld.cli.show import show
@@ -157,6 +158,6 @@ def _options(
 
 for _command in (match, merge, graph, follow, diff, rebase, transform_points, show, explain):
     app.command(cls=WithSettings)(_command)
-for _command in (demo, benchmark, environment, simulate, slam):
+for _command in (navigability, demo, benchmark, environment, simulate, slam):
     app.command()(_command)
 app.add_typer(bag)

@@ -29,8 +29,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from mapmeld.se2 import Pose2
-    from mapmeld.simulation import Driver, Environment, FloorPlan
+    from mapmeld.simulation import Driver, Environment, FloorPlan, Mapper
     from mapmeld.simulation.pictures import Drive
+    from mapmeld.simulation.recording_file import RecordingWriter
+    from mapmeld.simulation.slam_mapper import SlamMapper
 
 
 class Drives(StrEnum):
@@ -73,6 +75,17 @@ def simulate(
     start: Annotated[
         str | None, typer.Option(metavar="X,Y,DEG", help="Where the robot starts: metres, degrees.")
     ] = None,
+    slam: Annotated[
+        bool,
+        typer.Option(
+            "--slam",
+            help="Each robot maps on the way (GMapping): /map and its frame; --drive frontier uses it.",
+        ),
+    ] = False,
+    slam_params: Annotated[
+        Path | None,
+        typer.Option("--slam-params", metavar="FILE", help="YAML file with parameters of slam_gmapping."),
+    ] = None,
     duration: Annotated[
         float,
         typer.Option(metavar="S", min=0.1, max=36000.0, help="Stop after so many seconds at the latest."),
@@ -110,7 +123,10 @@ def simulate(
         raise typer.BadParameter("goes with --drive route, and that needs it", param_hint="--route")
     if robots > 1 and (drive in (Drives.ROUTE, Drives.KEYBOARD) or start is not None):
         raise typer.BadParameter("more than one goes on tours and frontiers only", param_hint="--robots")
+    if slam_params is not None and not slam:
+        raise typer.BadParameter("is for --slam", param_hint="--slam-params")
     given = None if start is None else _read_start(start)
+    mappers = _mappers(robots, seed * 1000 + mapping, slam_params) if slam else []
     made, _ = wanted_environment(file, seed, config, size, extra_doors, furniture, wall, door)
     plan = FloorPlan(made)
     tours = plan_tours(made, mapping + robots - 1, seed, plan=plan)[mapping - 1 :]
@@ -124,7 +140,11 @@ def simulate(
         elif drive is Drives.KEYBOARD:
             drivers, watch = _at_keyboard(made, stack)
         else:
-            drivers = _on_their_own(drive, made, plan, [tour.stops for tour in tours], mapping)
+            drivers = _on_their_own(drive, made, plan, [tour.stops for tour in tours], mapping, mappers)
+        if slam and drive is not Drives.FRONTIER:  # who explores feeds the map that it explores with
+            from mapmeld.simulation.slam_mapper import MappingDriver
+
+            drivers = [MappingDriver(*pair) for pair in zip(drivers, mappers, strict=True)]
         # Another mapping of a place has other noise, but the place stays as it is.
         world = World(made, starts, seed=seed * 1000 + mapping - 1)
         ways = [Drive([], []) for _ in starts]
@@ -133,21 +153,29 @@ def simulate(
         with recording_to(out, world.build, robots, force=force) as recording:
             for moment in driven(world, drivers, duration):
                 recording.add(moment)
+                if slam:
+                    mapper = mappers[moment.robot]
+                    recording.add_map_frame(moment.robot, moment.stamp, mapper.slam.T_map_odom)
+                    _record_state(recording, moment.robot, moment.stamp, mapper)
                 ways[moment.robot].true.append(moment.T_world_base)
                 ways[moment.robot].believed.append(moment.T_odom_base)
                 shown(moment.stamp)
                 watch(moment.stamp, moment.T_world_base)
+            for robot, mapper in enumerate(mappers):
+                mapper.finish()
+                _record_state(recording, robot, world.time, mapper)
         seconds = time.process_time() - begun
     lines = [_summary(way) for way in ways]
     names = [f"Robot {i + 1} drove" for i in range(robots)] if robots > 1 else ["Drove"]
     said = [f"{name} {line}" for name, line in zip(names, lines, strict=True)]
     if picture is not None:
         write_picture(drive_picture(made, ways, " ".join(said)), picture, force=force)
+    counts = f"{recording.scans} scans" + (f", {recording.maps} maps" if slam else "")
     print_lines(
         f"Environment: {described(made)}",
         *said,
         f"Simulated {world.time:.1f} s in {seconds:.1f} s of computing",
-        f"Written: {', '.join(str(path) for path in (out, picture) if path)} ({recording.scans} scans)",
+        f"Written: {', '.join(str(path) for path in (out, picture) if path)} ({counts})",
     )
 
 
@@ -175,15 +203,48 @@ def _on_their_own(
     plan: FloorPlan,
     stops: Sequence[tuple[tuple[float, float], ...]],
     seed: int,
+    mappers: Sequence[SlamMapper],
 ) -> list[Driver]:
     from mapmeld.simulation import MECABOT, FrontierDriver, KnownPoseMapper, TourDriver
 
     if drive is Drives.TOUR:
         return [TourDriver(plan, places, seed=seed + i) for i, places in enumerate(stops)]
-    return [
-        FrontierDriver(KnownPoseMapper(environment.size, MECABOT.laser), seed=seed + i)
-        for i in range(len(stops))
-    ]
+    on_board: Sequence[Mapper] = mappers or [KnownPoseMapper(environment.size, MECABOT.laser) for _ in stops]
+    return [FrontierDriver(mapper, seed=seed + i) for i, mapper in enumerate(on_board)]
+
+
+def _mappers(robots: int, seed: int, params: Path | None) -> list[SlamMapper]:
+    """Return a mapper for each robot, its code compiled."""
+    from dataclasses import asdict
+
+    from mapmeld.cli.errors import say
+    from mapmeld.cli.parameters import ParametersError
+    from mapmeld.cli.progress import working
+    from mapmeld.extras import required
+    from mapmeld.simulation import MECABOT
+
+    required("numba", "sim")
+    from mapmeld.simulation.slam_mapper import SlamMapper, onboard_parameters
+    from mapmeld.slam import GMappingParameters, prepare, read_parameters
+
+    parameters = onboard_parameters(MECABOT.laser)
+    if params is not None:
+        found = read_parameters(params)
+        if found.passed_over:
+            say(f"note: {params}: of the ROS node alone, and not used: {', '.join(found.passed_over)}")
+        try:
+            parameters = GMappingParameters(**{**asdict(parameters), **found.settings})
+        except ValueError as error:
+            raise ParametersError(f"{params}: {error}") from error
+    with working("Getting ready (the first time, code has to be compiled)"):
+        prepare()
+    return [SlamMapper(MECABOT.laser, parameters, seed + robot) for robot in range(robots)]
+
+
+def _record_state(recording: RecordingWriter, robot: int, stamp: float, mapper: SlamMapper) -> None:
+    state = mapper.take_state()
+    if state is not None:
+        recording.add_map(robot, stamp, state)
 
 
 def _on_route(path: Path, plan: FloorPlan, seed: int) -> tuple[list[Driver], Pose2 | None]:

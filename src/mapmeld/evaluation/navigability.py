@@ -276,6 +276,11 @@ def navigability(
     return Navigability(tuple(ways))
 
 
+def drivable(grid: OccupancyGrid, radius: float) -> Mask:
+    """Return the cells (rows, cols) on which the centre of a round robot can be; see `reach`."""
+    return _Floor.of(_checked(grid, radius), radius).drivable
+
+
 Cell = tuple[int, int]
 
 

@@ -62,6 +62,7 @@ class FrontierDriver:
         self._target: tuple[float, float] | None = None
         self._near_since: float | None = None
         self._begun: float | None = None
+        self._T_map_world = Pose2()
 
     def command(self, sight: Sight) -> Command | None:
         """Return what to do; None when nothing is left to explore."""
@@ -72,6 +73,8 @@ class FrontierDriver:
         if sight.stamp - self._begun < _WAIT:
             return STOP
         at = self._mapper.pose()
+        # Others are seen relative to the robot; on its map they are so relative to where it believes to be.
+        self._T_map_world = at @ sight.T_world_base.inverse()
         self._mind_vain(sight.stamp, at)
         if sight.stamp - self._looked >= _PERIOD or self._target is None:
             self._look(sight, at)
@@ -139,9 +142,12 @@ class FrontierDriver:
         assert planner is not None
         if others:
             # Known in the world's frame only: of use where the map has that frame too.
-            blocked = blocked | discs(grid, others, 2 * self._radius - MARGIN)
+            blocked = blocked | discs(grid, self._on_map(others), 2 * self._radius - MARGIN)
             planner = Planner(grid, blocked, self._radius, passable=grid.free)
         return planner.path(start, goal)
+
+    def _on_map(self, others: tuple[tuple[float, float], ...]) -> list[tuple[float, float]]:
+        return [(float(x), float(y)) for x, y in self._T_map_world.apply(others)]
 
 
 def frontiers(grid: OccupancyGrid) -> tuple[Points, np.ndarray]:

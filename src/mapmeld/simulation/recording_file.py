@@ -82,7 +82,7 @@ class RecordingWriter:
     - ``scan`` sensor_msgs/LaserScan, ``odom`` nav_msgs/Odometry, ``cmd_vel`` geometry_msgs/Twist,
       ``map`` nav_msgs/OccupancyGrid if maps are given;
     - ``ground_truth`` geometry_msgs/PoseStamped: where the base frame truly is;
-    - ``/tf`` odom to base_link, ``/tf_static`` base_link to laser.
+    - ``/tf`` odom to base_link, and map to odom if that is given; ``/tf_static`` base_link to laser.
     """
 
     def __init__(self, file: BinaryIO, writing: Any, build: Robot, names: Sequence[str]) -> None:
@@ -95,7 +95,7 @@ class RecordingWriter:
         self._schemas: dict[str, int] = {}
         self._said: dict[int, Command] = {}
         self._before: dict[int, tuple[float, Pose2]] = {}
-        self.scans = 0
+        self.scans = self.maps = 0
         T_base_laser = build.laser.T_base_laser
         height = build.laser_height
         transforms = [
@@ -142,18 +142,31 @@ class RecordingWriter:
                 linear=twist.linear, angular=twist.angular,
             )  # fmt: skip
 
+    def add_map_frame(self, robot: int, stamp: float, T_map_odom: Pose2) -> None:
+        """Write where SLAM believes odometry's frame to lie in the map's."""
+        frames = self._frame(robot, MAP), self._frame(robot, ODOM)
+        self._write(
+            "/tf", "tf2_msgs/msg/TFMessage", stamp, _VOLATILE,
+            transforms=[self._transform(stamp, *frames, T_map_odom)],
+        )  # fmt: skip
+
     def add_map(self, robot: int, stamp: float, grid: OccupancyGrid) -> None:
-        """Write a state of a robot's map; its frame is the grid's, or ``map`` where that is empty."""
+        """Write a state of a robot's map that is published at a time.
+
+        Its frame is the grid's, or ``map`` where that is empty; its own stamp is the grid's, if that has one.
+        """
         rows, cols = grid.shape
+        made = stamp if grid.stamp is None else grid.stamp
         info = self._kind("nav_msgs/msg/MapMetaData")(
-            map_load_time=self._time(stamp), resolution=grid.resolution, width=cols, height=rows,
+            map_load_time=self._time(made), resolution=grid.resolution, width=cols, height=rows,
             origin=self._pose(grid.origin),
         )  # fmt: skip
         self._write(
             self._topic(robot, "map"), "nav_msgs/msg/OccupancyGrid", stamp, _LATCHED,
-            header=self._header(stamp, grid.frame_id or self._frame(robot, MAP)), info=info,
+            header=self._header(made, grid.frame_id or self._frame(robot, MAP)), info=info,
             data=grid.cells.reshape(-1),
         )  # fmt: skip
+        self.maps += 1
 
     def _scan(self, robot: int, stamp: float, ranges: NDArray[np.float32]) -> None:
         laser = self._build.laser
