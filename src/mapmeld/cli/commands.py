@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Annotated, Any
 
@@ -156,8 +156,13 @@ def _options(
     pass
 
 
-for _command in (match, merge, graph, follow, diff, rebase, transform_points, show, explain):
+_TAKES_SETTINGS: tuple[Callable[..., None], ...] = (
+    match, merge, graph, follow, diff, rebase, transform_points, show, explain,
+)  # fmt: skip
+_OTHERS: tuple[Callable[..., None], ...] = (navigability, demo, benchmark, environment, simulate, slam)
+
+for _command in _TAKES_SETTINGS:
     app.command(cls=WithSettings)(_command)
-for _command in (navigability, demo, benchmark, environment, simulate, slam):
+for _command in _OTHERS:
     app.command()(_command)
 app.add_typer(bag)
