@@ -74,7 +74,7 @@ def _assess(
     model = fitted_model()
     local = np.array([to_local(a.walls, b.walls, T) for T in transforms])
     local = refine(a.walls, b.walls, local, FINE_SCALES, FINE_POINTS)
-    modes = _distinct(b.walls, _weighed(a.walls, b.walls, local, model))
+    modes = _distinct(_weighed(a.walls, b.walls, local, model))
     probabilities = mode_probabilities(modes, model)
     return _answer(a.walls, b.walls, modes, probabilities, parameters.accept_probability)
 
