@@ -34,7 +34,7 @@ REPEAT_SCORE = 2.0  # from which, standing alone, a mode shows that the place ma
 REPEAT_WALL = 0.7  # of the best mode's tested wall that it must have had tested too
 REPEAT_SLOPE = 10.0  # score that it falls behind, by the share by which a metre of its wall tells less
 FIXED_LEAST = 4.0  # [m] of wall that must fix every direction
-WALL_LEAST = 36.0  # [m] of wall of both maps in the overlap; rooms that look alike can have less in common
+WALL_LEAST = 30.0  # [m] of wall of both maps in the overlap; rooms that look alike can have less in common
 AT_ODDS = 0.09, 0.13  # shares of wall explained as it lies x contradicted: doubtful from, impossible from
 APART = 1.0  # [m] modes nearer than this (or than the maps bend) are one
 APART_TURNED = 0.13  # [rad]
@@ -44,6 +44,7 @@ SLIDE_WEAK = 15.0  # [m] by less wall than this
 SLIDES = np.arange(-10, 11) * 0.1  # [m]
 SLIDE_SOFTNESS = 2.0  # what scores along the way are divided by: so far they scatter
 SLIDE_GAIN = 1.0  # of score, for which a mode is moved
+SLIDE_KEEPS = 0.6  # share of the walls explained as they lie that it must keep
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,8 +155,8 @@ def _centred(walls_a: WallMap, walls_b: WallMap, mode: Mode, model: ProbabilityM
     local = mode.local + weights @ steps
     (evidence,) = weigh(walls_a, walls_b, local[None])
     score = model.score(evidence)
-    if score < mode.score + SLIDE_GAIN:  # the walls fix it more exactly than this
-        return mode
+    if score < mode.score + SLIDE_GAIN or evidence.hit < SLIDE_KEEPS * mode.evidence.hit:
+        return mode  # the walls fix it more exactly than this
     return Mode(local, evidence, score, math.sqrt(float(weights @ (SLIDES - shift) ** 2)))
 
 
@@ -257,6 +258,9 @@ def _behind(mode: Mode, best: Mode) -> float:
 def _answer(
     walls_a: WallMap, walls_b: WallMap, modes: Sequence[Mode], probabilities: Doubles, accept: float
 ) -> MatchResult:
+    # What lowers a probability may lower that of the mode with the highest score below others'.
+    order = np.argsort(-probabilities, kind="stable")
+    modes, probabilities = [modes[k] for k in order], probabilities[order]
     best = modes[0].evidence
     reason = (
         f"of {best.wall:.0f} m of wall in the overlap the other map explains "
