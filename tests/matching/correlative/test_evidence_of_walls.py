@@ -143,7 +143,7 @@ def test_many_transforms_are_weighed_as_one_by_one() -> None:
 
 
 # ---------------------------------------------------------------------- figures
-PERFECT = Evidence(100, 100, 100, 0, 0, 0.1, 0.6, 0, 1.0, 30, np.zeros(3))
+PERFECT = Evidence(100, 100, 100, 0, 0, 0.1, 0.6, 0, 1.0, 30, 1j, 0j, np.zeros(3))
 
 
 def test_surplus_is_the_deviance_from_chance() -> None:

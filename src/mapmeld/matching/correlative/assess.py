@@ -79,7 +79,7 @@ def _assess(
     if not len(local):
         return _rejected("the maps do not meet where they are laid")
     local = refine(a.walls, b.walls, local, FINE_SCALES, FINE_POINTS)
-    modes = _distinct(b.walls, _weighed(a.walls, b.walls, local, model))
+    modes = _distinct(_weighed(a.walls, b.walls, local, model))
     probabilities = mode_probabilities(modes, model)
     return _answer(a.walls, b.walls, modes, probabilities, parameters.accept_probability)
 

@@ -39,6 +39,10 @@ class Evidence:
         Area known in both / known area of the smaller map.
     weak
         Explained wall that fixes the least fixed direction [m]; small along corridors.
+    free
+        The direction (unit vector of a's local frame) in which that is.
+    middle
+        Middle of the explained wall, in b's local frame.
     unbent
         The rigid transform (local frames, (3,)) nearest to the bent one.
     """
@@ -53,6 +57,8 @@ class Evidence:
     bend: float
     overlap: float
     weak: float
+    free: complex
+    middle: complex
     unbent: Doubles
 
     @property
@@ -118,11 +124,14 @@ def weigh(pa: WallMap, pb: WallMap, t: Doubles, n: int = 1200) -> list[Evidence]
     inside = near | (depth >= 0) | (depth_bent >= 0)
     explained = metres * _hits(bent)
     hit_bent = explained.sum(axis=1) + 1e-6
-    turn, _ = turn_and_shift(t)
+    turn, shift = turn_and_shift(t)
     lines_a = np.broadcast_to(pa.lines[:n], (len(t), len(pa.lines[:n])))
     lines = np.concatenate([pb.lines[:n] * turn, lines_a], axis=1)
     nx, ny = lines.real, lines.imag
     xx, xy, yy = (np.sum(explained * v, axis=1) for v in (nx * nx, nx * ny, ny * ny))
+    # Least wall is seen across this: half the angle of the doubled one that most is.
+    free = 1j * np.exp(0.5j * np.arctan2(2 * xy, xx - yy))
+    middle = (((explained * rigid.x).sum(axis=1) / hit_bent)[:, None] - shift) * turn.conj()
     area, close, deep = _common_floor(pa, pb, t)
     columns = zip(
         (inside @ metres + 1e-6).tolist(),
@@ -135,6 +144,8 @@ def weigh(pa: WallMap, pb: WallMap, t: Doubles, n: int = 1200) -> list[Evidence]
         np.sqrt((explained * _squared(u)).sum(axis=1) / hit_bent).tolist(),
         (area / min(pa.area, pb.area)).tolist(),
         np.maximum(0, (xx + yy) / 2 - np.hypot((xx - yy) / 2, xy)).tolist(),
+        free.tolist(),
+        middle[:, 0].tolist(),
         nearest_rigid(t, rigid.x, u, explained),
         strict=True,
     )

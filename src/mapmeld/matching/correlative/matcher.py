@@ -34,10 +34,17 @@ REPEAT_SCORE = 2.0  # from which, standing alone, a mode shows that the place ma
 REPEAT_WALL = 0.7  # of the best mode's tested wall that it must have had tested too
 REPEAT_SLOPE = 10.0  # score that it falls behind, by the share by which a metre of its wall tells less
 FIXED_LEAST = 4.0  # [m] of wall that must fix every direction
-WALL_LEAST = 36.0  # [m] of wall of both maps in the overlap; rooms that look alike can have less in common
+WALL_LEAST = 30.0  # [m] of wall of both maps in the overlap; rooms that look alike can have less in common
 AT_ODDS = 0.09, 0.13  # shares of wall explained as it lies x contradicted: doubtful from, impossible from
-APART = 0.7  # [m] modes nearer than this (or than the maps bend) are one
-APART_TURNED = 0.09  # [rad]
+APART = 1.0  # [m] modes nearer than this (or than the maps bend) are one
+APART_TURNED = 0.13  # [rad]
+AS_GOOD = 1.0  # score by which a mode may fall behind and still be as good as the best of its kind
+SLIDE_SCORES = 2.0, 10.0  # of modes that may be moved along the direction that is fixed least
+SLIDE_WEAK = 15.0  # [m] by less wall than this
+SLIDES = np.arange(-10, 11) * 0.1  # [m]
+SLIDE_SOFTNESS = 2.0  # what scores along the way are divided by: so far they scatter
+SLIDE_GAIN = 1.0  # of score, for which a mode is moved
+SLIDE_KEEPS = 0.6  # share of the walls explained as they lie that it must keep
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,11 +59,14 @@ class Mode:
         What speaks for it.
     score
         Of the probability model, as if there were no other modes.
+    spread
+        Standard deviation [m] along the direction that is fixed least, where it was estimated.
     """
 
     local: Doubles
     evidence: Evidence
     score: float
+    spread: float = 0.0
 
 
 def match_correlative(
@@ -93,14 +103,14 @@ def ranked_modes(a: PreparedMap, b: PreparedMap, parameters: CorrelativeParamete
     transforms = refine(a.walls, b.walls, transforms, COARSE_SCALES, COARSE_POINTS)
     transforms = transforms[_most_promising(a.walls, b.walls, transforms)]
     transforms = refine(a.walls, b.walls, transforms, FINE_SCALES, FINE_POINTS)
-    return _distinct(b.walls, _weighed(a.walls, b.walls, transforms, fitted_model()))
+    return _distinct(_weighed(a.walls, b.walls, transforms, fitted_model()))
 
 
 def _most_promising(walls_a: WallMap, walls_b: WallMap, transforms: Doubles) -> list[int]:
     """Return the rows worth a full look, none of them a repetition of a better one."""
     quick = quick_scores(walls_a, walls_b, transforms, 2 * COARSE_POINTS)
     quick[0] = np.inf  # the search's own favourite always gets its full look
-    metres, radians = _apart(walls_b, transforms)
+    metres, radians = _apart(complex(walls_b.points[:200].mean()), transforms)
     differ = (metres > 0.4) | (radians > 0.05)
     kept: list[int] = []
     for k in np.argsort(-quick, kind="stable"):
@@ -124,34 +134,62 @@ def _weighed(walls_a: WallMap, walls_b: WallMap, transforms: Doubles, model: Pro
         # Not at the price of walls that fitted as they lay: those are more exact than any bending.
         if again.score > best.score and again.evidence.hit >= UNBENT_KEEPS * best.evidence.hit:
             modes[0] = again
+    low, high = SLIDE_SCORES
+    if low < modes[0].score < high and modes[0].evidence.weak < SLIDE_WEAK:
+        modes[0] = _centred(walls_a, walls_b, modes[0], model)
     return modes
 
 
-def _distinct(walls_b: WallMap, modes: Sequence[Mode]) -> list[Mode]:
+def _centred(walls_a: WallMap, walls_b: WallMap, mode: Mode, model: ProbabilityModel) -> Mode:
+    """Move a mode along the direction that is fixed least to the middle of where it may lie.
+
+    Along a corridor the alignment holds on to what little crosses it, be it a door frame or clutter; the
+    whole evidence, after bending, often is as good or better for half a metre to one side.
+    """
+    free = mode.evidence.free
+    steps = np.stack([SLIDES * free.real, SLIDES * free.imag, np.zeros(len(SLIDES))], axis=1)
+    scores = np.array([model.score(e) for e in weigh(walls_a, walls_b, mode.local + steps)])
+    weights = np.exp((scores - scores.max()) / SLIDE_SOFTNESS)
+    weights /= weights.sum()
+    shift = float(weights @ SLIDES)
+    local = mode.local + weights @ steps
+    (evidence,) = weigh(walls_a, walls_b, local[None])
+    score = model.score(evidence)
+    if score < mode.score + SLIDE_GAIN or evidence.hit < SLIDE_KEEPS * mode.evidence.hit:
+        return mode  # the walls fix it more exactly than this
+    return Mode(local, evidence, score, math.sqrt(float(weights @ (SLIDES - shift) ** 2)))
+
+
+def _distinct(modes: Sequence[Mode]) -> list[Mode]:
     """Return modes that truly differ, best first; of those that do not, the one that fits best unbent.
 
-    Modes are one if they are near one another as they lie, or as bending moves them.
+    Modes are one if they are near one another as they lie, or as bending moves them: nothing in a
+    building repeats itself within a metre, but maps that bend fit in several ways.
     """
     count = len(modes)
     transforms = np.array([mode.local for mode in modes] + [mode.evidence.unbent for mode in modes])
-    metres, radians = _apart(walls_b, transforms)
-    metres[radians > APART_TURNED] = np.inf
-    nearest = metres.reshape(2, count, 2, count).min(axis=(0, 2))
     groups: list[list[int]] = []
-    for k in range(count):
-        for group in groups:
-            if nearest[k, group[0]] <= max(APART, 1.5 * modes[group[0]].evidence.bend):
-                group.append(k)
-                break
-        else:
-            groups.append([k])
-    return [max((modes[k] for k in group), key=lambda mode: mode.evidence.hit) for group in groups]
+    left = list(range(count))
+    while left:
+        first = left[0]
+        evidence = modes[first].evidence
+        # Where the better one has its walls: elsewhere a small turn would part what is one.
+        metres, radians = _apart(evidence.middle, transforms)
+        metres[radians > APART_TURNED] = np.inf
+        nearest = metres.reshape(2, count, 2, count).min(axis=(0, 2))[first]
+        near = max(APART, 1.5 * evidence.bend)
+        groups.append([k for k in left if k == first or nearest[k] <= near])
+        left = [k for k in left if k not in groups[-1]]
+    heads = [
+        [modes[k] for k in group if modes[k].score >= modes[group[0]].score - AS_GOOD] for group in groups
+    ]
+    return [max(head, key=lambda mode: mode.evidence.hit) for head in heads]
 
 
-def _apart(walls_b: WallMap, t: Doubles) -> tuple[Doubles, Doubles]:
-    """How far apart (k, k) transforms t (k, 3) put the middle of b [m], and how differently they turn it."""
+def _apart(middle_b: complex, t: Doubles) -> tuple[Doubles, Doubles]:
+    """How far apart (k, k) transforms t (k, 3) put a point of b [m], and how differently they turn it."""
     turn, shift = turn_and_shift(t)
-    middle = turn[:, 0] * walls_b.points[:200].mean() + shift[:, 0]
+    middle = turn[:, 0] * middle_b + shift[:, 0]
     turned = np.remainder(t[:, 2] - t[:, 2, None] + math.pi, math.tau) - math.pi
     return np.abs(middle - middle[:, None]), np.abs(turned)
 
@@ -220,6 +258,9 @@ def _behind(mode: Mode, best: Mode) -> float:
 def _answer(
     walls_a: WallMap, walls_b: WallMap, modes: Sequence[Mode], probabilities: Doubles, accept: float
 ) -> MatchResult:
+    # What lowers a probability may lower that of the mode with the highest score below others'.
+    order = np.argsort(-probabilities, kind="stable")
+    modes, probabilities = [modes[k] for k in order], probabilities[order]
     best = modes[0].evidence
     reason = _in_words(best)
     if probabilities[0] >= accept:
@@ -233,7 +274,7 @@ def _answer(
     else:
         verdict = Verdict.REJECTED
         reason += ": not enough to be sure"
-    fitted, covariance = best_fit(walls_a, walls_b, best.unbent, best.overlap)
+    fitted, covariance = _fitted(walls_a, walls_b, modes[0])
     return MatchResult(
         T_a_b=to_metric(walls_a, walls_b, fitted),
         verdict=verdict,
@@ -260,6 +301,27 @@ def _in_words(found: Evidence) -> str:
         f"of {found.wall:.0f} m of wall in the overlap the other map explains "
         f"{100 * found.hit_bent / found.wall:.0f} % and contradicts {100 * found.contra / found.wall:.1f} %"
     )
+
+
+def _fitted(walls_a: WallMap, walls_b: WallMap, mode: Mode) -> tuple[Doubles, Doubles]:
+    """Return the transform that fits all walls best (local frames), and its covariance.
+
+    A mode that was moved to the middle of where it may lie stays there, along that direction.
+    """
+    found = mode.evidence
+    fitted, covariance = best_fit(walls_a, walls_b, found.unbent, found.overlap)
+    if mode.spread == 0:
+        return fitted, covariance
+    moved = _taken(fitted, found.middle) - _taken(found.unbent, found.middle)
+    back = (moved * found.free.conjugate()).real * found.free
+    angle = walls_a.frame.theta
+    free = found.free * complex(math.cos(angle), math.sin(angle))
+    along = mode.spread * np.array([free.real, free.imag, 0.0])
+    return fitted - np.array([back.real, back.imag, 0.0]), covariance + np.outer(along, along)
+
+
+def _taken(t: Doubles, point: complex) -> complex:
+    return complex(t[0], t[1]) + point * complex(math.cos(t[2]), math.sin(t[2]))
 
 
 def _similarity(walls_a: WallMap, walls_b: WallMap, found: Evidence) -> float:
