@@ -11,7 +11,7 @@ from ready import walls_of
 from mapmeld.grid import FREE, OCCUPIED, OccupancyGrid
 from mapmeld.matching import match
 from mapmeld.matching.correlative.evidence import Evidence, weigh
-from mapmeld.matching.correlative.matcher import SLIDE_GAIN, Mode, _centred, _covariance
+from mapmeld.matching.correlative.matcher import SLIDE_GAIN, Mode, _centred, _fitted
 from mapmeld.matching.correlative.probability import ProbabilityModel
 from mapmeld.matching.correlative.wall_map import WallMap
 from mapmeld.se2 import Pose2
@@ -76,7 +76,7 @@ def test_the_covariance_knows_the_spread() -> None:
     walls, model = walls_of(grid), plateau(0.2, 0.6, 30.0)
     mode = at_rest(walls, model)
     moved = Mode(mode.local, mode.evidence, mode.score, 0.3)
-    more = _covariance(walls, walls, moved) - _covariance(walls, walls, mode)
+    more = _fitted(walls, walls, moved)[1] - _fitted(walls, walls, mode)[1]
     along = np.array([math.cos(0.5), math.sin(0.5), 0.0])
     assert along @ more @ along == pytest.approx(0.09, rel=0.01)
     assert np.trace(more) == pytest.approx(0.09, rel=0.01)

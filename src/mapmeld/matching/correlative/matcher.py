@@ -312,7 +312,7 @@ def _fitted(walls_a: WallMap, walls_b: WallMap, mode: Mode) -> tuple[Doubles, Do
     fitted, covariance = best_fit(walls_a, walls_b, found.unbent, found.overlap)
     if mode.spread == 0:
         return fitted, covariance
-    moved = _taken(fitted, found.middle) - _taken(found.unbent, found.middle)
+    moved = _taken(fitted, found.middle) - _taken(mode.local, found.middle)
     back = (moved * found.free.conjugate()).real * found.free
     angle = walls_a.frame.theta
     free = found.free * complex(math.cos(angle), math.sin(angle))
