@@ -82,8 +82,8 @@ def test_several_robots() -> None:
 def test_robots_that_map_on_the_way_are_followed() -> None:
     Path("few.yaml").write_text("slam_gmapping: {particles: 3, base_frame: base}\n")
     outcome = run(
-        "simulate", "--seed", 5, "--size", "14x12", "-o", "run.mcap", "--robots", 2, "--slam", "--duration", 20,
-        "--slam-params", "few.yaml",
+        "simulate", "--seed", 5, "--size", "14x12", "-o", "run.mcap", "--robots", 2, "--slam",
+        "--duration", 20, "--slam-params", "few.yaml",
     )  # fmt: skip
     assert outcome.code == 0
     assert "base_frame" in outcome.line
