@@ -2,7 +2,7 @@
 
     python benchmarks/changes.py
 
-Six pairs of maps by the simulation of `examples/make_maps.py`: a robot maps the office, and again after
+Six pairs of maps by the simulation of `drawn_office.py`: a robot maps the office, and again after
 about a quarter of the furniture was carried away and ten new things came. The later map is then bent by a
 smooth random displacement of up to 0, 0.2 and 0.4 m (wave lengths of 14 to 30 m on a floor of 20 x 16 m),
 matched, and compared with and without local bending.
@@ -15,16 +15,13 @@ a change of that kind is reported.
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import cv2
+import drawn_office
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,27 +51,14 @@ class Pair:
     came: Mask
 
 
-def simulation() -> ModuleType:
-    """Import the script that makes the example maps."""
-    path = Path(__file__).parents[1] / "examples" / "make_maps.py"
-    spec = importlib.util.spec_from_file_location("make_maps", path)
-    if spec is None or spec.loader is None:
-        raise SystemExit(f"{path} is missing")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["make_maps"] = module  # dataclasses look their module up by name
-    spec.loader.exec_module(module)
-    return module
-
-
-def refurnished(sim: Any, rng: np.random.Generator) -> Any:
+def refurnished(rng: np.random.Generator) -> Any:
     """Return the office with some of its furniture gone and ten new things on the free floor."""
-    office = sim.OFFICE
-    boxes, tables, chairs = (
-        [item for item in items if rng.random() < kept]
-        for items, kept in ((office.boxes, 0.85), (office.tables, 0.7), (office.chairs, 0.6))
-    )
+    office = drawn_office.OFFICE
+    boxes = [item for item in office.boxes if rng.random() < 0.85]
+    tables = [item for item in office.tables if rng.random() < 0.7]
+    chairs = [item for item in office.chairs if rng.random() < 0.6]
     bare = replace(office, boxes=tuple(boxes), tables=tuple(tables), chairs=tuple(chairs))
-    _, blocked = sim.draw(bare)
+    _, blocked = drawn_office.draw(bare)
     room = cv2.distanceTransform((~blocked.occupied).astype(np.uint8), cv2.DIST_L2, 5) * blocked.resolution
     row, col = np.indices(room.shape)
 
@@ -94,18 +78,18 @@ def refurnished(sim: Any, rng: np.random.Generator) -> Any:
     return replace(office, boxes=tuple(boxes), tables=tuple(tables), chairs=tuple(chairs))
 
 
-def simulated(sim: Any, seed: int) -> Pair:
+def simulated(seed: int) -> Pair:
     """Map the office before and after; furniture that bars the robot's way is set up anew."""
-    tour = list(sim.TOURS.values())[seed % len(sim.TOURS)]
-    before, _ = sim.draw(sim.OFFICE)
+    tour = list(drawn_office.TOURS.values())[seed % len(drawn_office.TOURS)]
+    before, _ = drawn_office.draw(drawn_office.OFFICE)
     for attempt in range(50):
-        later = refurnished(sim, np.random.default_rng((seed, attempt)))
+        later = refurnished(np.random.default_rng((seed, attempt)))
         try:
-            new = sim.simulate(later, tour, np.random.default_rng((7, seed)))
+            new = drawn_office.simulate(later, tour, np.random.default_rng((7, seed)))
         except ValueError:
             continue
-        after, _ = sim.draw(later)
-        old = sim.simulate(sim.OFFICE, tour, np.random.default_rng((8, seed)))
+        after, _ = drawn_office.draw(later)
+        old = drawn_office.simulate(drawn_office.OFFICE, tour, np.random.default_rng((8, seed)))
         went, came = before.occupied & ~after.occupied, after.occupied & ~before.occupied
         return Pair(old, new, tour.start, before, went, came)
     raise SystemExit("no furniture leaves the robot a way")
@@ -169,8 +153,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--pairs", type=int, default=6, help="how many pairs (default 6)")
     options = parser.parse_args(arguments)
-    sim = simulation()
-    pairs = [simulated(sim, seed) for seed in range(options.pairs)]
+    pairs = [simulated(seed) for seed in range(options.pairs)]
     print("| | bent by up to | precision | recall | changes |\n|---|---|---|---|---|")
     for name, settings in DESIGNS.items():
         for amount in (0.0, 0.2, 0.4):

@@ -1,10 +1,11 @@
-"""Simulate two robots that map one office floor, and record their maps as they grow.
+"""Record how the maps of two simulated robots grow, that map one office floor.
 
     python examples/make_recording.py --out somewhere
 
-The robots, the floor and the noise are those of ``make_maps.py``, so that the last state on each topic
-is the map that it writes. Robot 2 sets out later, and each publishes at a pace of its own. The
-recording is an MCAP file as ``ros2 bag record`` writes it; it takes the extra "bags" to write it.
+Robots, floor and SLAM are those of ``make_maps.py``, so that the last state on each topic is the map that it
+writes. Robot 2 sets out later, and each publishes at a pace of its own. The recording is an MCAP file as
+``ros2 bag record`` writes it. (``mapmeld simulate --robots 2 --slam`` records all that robots publish, but
+that is megabytes.) It takes the extra "sim", and about a minute.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ import argparse
 import io
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from make_maps import grow, map_jobs
+from make_maps import SEED, history, mappings
 
 from mapmeld.errors import MapmeldError
 from mapmeld.extras import required
@@ -27,29 +28,42 @@ from mapmeld.io.atomic import check_targets, write_files
 GRID = "nav_msgs/msg/OccupancyGrid"
 NAME = "two_robots.mcap"
 BEGINNING = 1_767_225_600  # of the recording [s since the epoch]: 2026 in UTC
-SCAN_PERIOD = 0.25  # [s]
 DELAY = 80_000_000  # from the stamp of a map until it is received [ns]
 
 
 class Mapping(NamedTuple):
-    """When a robot sets out [s after the beginning], and after how many scans it publishes its map."""
+    """When a robot sets out [s after the beginning], and how often it publishes its map [s]."""
 
     departure: float
-    every: int
+    every: float
 
 
-MAPPINGS = {"robot_1": Mapping(0.5, 45), "robot_2": Mapping(9.7, 33)}
+MAPPINGS = {"robot_1": Mapping(0.5, 9.25), "robot_2": Mapping(9.7, 7.0)}
 
 
 def states(seed: int) -> Iterator[tuple[str, float, OccupancyGrid]]:
     """Give robot, stamp [s after the beginning] and map of every state, in time order."""
-    jobs = map_jobs(seed)
+    jobs = mappings(seed)
     found = [
-        (robot, mapping.departure + scans * SCAN_PERIOD, grid)
+        (robot, mapping.departure + after, grid)
         for robot, mapping in MAPPINGS.items()
-        for scans, grid in grow(*jobs[robot], every=mapping.every)
+        for after, grid in published(history(jobs[robot]), mapping.every)
     ]
     yield from sorted(found, key=lambda state: state[1])
+
+
+def published(maps: Iterable[OccupancyGrid], every: float) -> Iterator[tuple[float, OccupancyGrid]]:
+    """Give a robot's newest map every so many seconds, with the time, and the last one when it is there."""
+    due, newest = every, None
+    for grid in maps:
+        assert grid.stamp is not None
+        while grid.stamp >= due:
+            if newest is not None:
+                yield due, newest
+            due += every
+        newest = grid
+    if newest is not None and newest.stamp is not None:
+        yield newest.stamp, newest
 
 
 def grid_message(store: Any, stamp: int, frame_id: str, grid: OccupancyGrid) -> Any:
@@ -95,7 +109,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Simulate two robots and record their maps as they grow.")
     default = Path(__file__).parent / "recording"
     parser.add_argument("--out", type=Path, default=default, help="folder to write to")
-    parser.add_argument("--seed", type=int, default=1, help="of all randomness (default 1)")
+    parser.add_argument("--seed", type=int, default=SEED, help=f"of all randomness (default {SEED})")
     parser.add_argument("--force", action="store_true", help="overwrite a recording that is there")
     options = parser.parse_args(arguments)
     if options.seed < 0:

