@@ -27,6 +27,7 @@ from mapmeld.cli.graph import graph
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.rebase import rebase
+from mapmeld.cli.ros import ros
 from mapmeld.cli.show import show
 from mapmeld.cli.transform_points import transform_points
 from mapmeld.errors import MapmeldError
@@ -155,4 +156,5 @@ for _command in (
     match, merge, graph, follow, diff, rebase, transform_points, show, explain, demo, benchmark,
 ):  # fmt: skip
     app.command()(_command)
+app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(ros)
 app.add_typer(bag)

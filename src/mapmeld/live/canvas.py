@@ -86,6 +86,15 @@ class Canvas:
             self.frame_id,
         )
 
+    def blank(self) -> OccupancyGrid | None:
+        """Return a map as large as the last one, in which nothing is known; None if nothing was drawn yet."""
+        if self._low is None:
+            return None
+        (left, bottom), (right, top) = self._low, self._high
+        origin = Pose2(left * self.resolution, bottom * self.resolution)
+        cells = np.full((top - bottom, right - left), UNKNOWN, np.int8)
+        return OccupancyGrid(cells, self.resolution, origin, None, self.frame_id)
+
     def _layer(self, name: str, grid: OccupancyGrid, pose: Pose2) -> _Layer:
         before = self._layers.get(name)
         if before is not None and before.grid is grid and before.pose == pose:

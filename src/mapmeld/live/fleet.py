@@ -74,8 +74,13 @@ class _Robot:
     # The newest map that a match which is used, or a known pose, vouches for: only that is ever drawn. A map in
     # another frame, by a restart that nothing has noticed yet, is not.
     vouched: OccupancyGrid | None = None
+    version: int = 0  # counts the maps that were vouched for
     starts: int = 1
     anew: str = ""
+
+    def vouch(self, grid: OccupancyGrid) -> None:
+        if grid is not self.vouched:
+            self.vouched, self.version = grid, self.version + 1
 
 
 class Fleet:
@@ -274,10 +279,10 @@ class Fleet:
                     robot = self._robots[name]
                     # Pairs are looked at in turns: another's map may be older than what is vouched for already.
                     if robot.vouched is None or seen is robot.newest:
-                        robot.vouched = seen
+                        robot.vouch(seen)
         for name in self._known:
             if name in self._robots:
-                self._robots[name].vouched = self._robots[name].newest
+                self._robots[name].vouch(self._robots[name].newest)
 
     def _in_world(self, names: list[str], graph: MapGraph) -> dict[str, Pose2]:
         """Return T_world_robot of the robots that hang together with the world frame."""
@@ -309,7 +314,9 @@ class Fleet:
 
     # ------------------------------------------------------------------ what comes out
     def merged(self) -> OccupancyGrid | None:
-        """Return the merged map of the robots that are joined; None if none are.
+        """Return the merged map of the robots that are joined; one without anything known where none are any more.
+
+        None if none have ever been (since the world frame was set anew).
 
         Raises
         ------
@@ -322,11 +329,17 @@ class Fleet:
             assert vouched is not None
             placed[name] = (vouched, T)
         if not placed:
-            return None
+            return None if self._canvas is None else self._canvas.blank()
         if self._canvas is None:
             first = self._anchor or min(placed)
             self._canvas = Canvas(placed[first][0].resolution, self.settings.world_frame)
         return self._canvas.draw(placed, self.settings.fusion)
+
+    @property
+    def shown(self) -> tuple[object, ...]:
+        """What the merged map is drawn from: equal as long as that is the same."""
+        robots = ((name, self._robots[name].version, T) for name, T in sorted(self._poses.items()))
+        return (self.settings.fusion, self.settings.world_frame, *robots)
 
     def state(self) -> FleetState:
         """Return what is known of all robots and pairs."""

@@ -70,7 +70,7 @@ def _submitted(
     pool: ProcessPoolExecutor, function: Callable[..., R], waiting: dict[int, Job]
 ) -> dict[Future[R], int]:
     futures: dict[Future[R], int] = {}
-    with _one_thread_each(), contextlib.suppress(BrokenProcessPool):
+    with one_thread_each(), contextlib.suppress(BrokenProcessPool):
         for number, job in waiting.items():
             futures[pool.submit(_call, function, job)] = number
     return futures
@@ -81,7 +81,8 @@ def _call(function: Callable[..., R], job: Job) -> R:
 
 
 @contextlib.contextmanager
-def _one_thread_each() -> Iterator[None]:
+def one_thread_each() -> Iterator[None]:
+    """Let the numeric libraries of processes that are started meanwhile use one thread."""
     before = {name: os.environ.get(name) for name in _THREAD_SETTINGS}
     os.environ.update(dict.fromkeys(_THREAD_SETTINGS, "1"))
     try:
