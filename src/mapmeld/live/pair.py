@@ -55,7 +55,8 @@ class Pair:
             check_resolutions(*maps)
             self.finding = self._strategy.update(maps, previous)
             self.why = self.finding.why
-            self.withdrawn = self.finding.standing is Standing.WITHDRAWN
+            if self.finding.standing is not Standing.UNDECIDED:
+                self.withdrawn = self.finding.standing is Standing.WITHDRAWN
         except MapmeldError as error:
             self.start_anew(str(error), withdrawn=self.withdrawn)
             self.maps, self.turn = maps, turn
@@ -79,9 +80,9 @@ class Pair:
     @property
     def standing(self) -> Standing:
         """Whether the match is believed, after all states so far."""
-        if self.finding is not None:
-            return self.finding.standing
-        return Standing.WITHDRAWN if self.withdrawn else Standing.UNDECIDED
+        if self.withdrawn:  # also before a restart of one of the two
+            return Standing.WITHDRAWN
+        return Standing.UNDECIDED if self.finding is None else self.finding.standing
 
     @property
     def result(self) -> MatchResult | None:

@@ -10,11 +10,13 @@ from typing import Any
 
 from mapmeld.extras import MissingExtraError, required
 
+# Other middleware's descriptions of types are complained of on stderr, though they do no harm: not said.
+_QUIET = "<Tracing><Verbosity>none</Verbosity></Tracing>"
 # As rmw_cyclonedds does for ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST: the loopback, and no multicast.
-_LOOPBACK = """<CycloneDDS><Domain Id="any"><General><AllowMulticast>false</AllowMulticast><Interfaces>
+_LOOPBACK = """<General><AllowMulticast>false</AllowMulticast><Interfaces>
 <NetworkInterface name="lo" multicast="false" presence_required="true"/></Interfaces></General><Discovery>
 <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
-<Peers><Peer Address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
+<Peers><Peer Address="127.0.0.1"/></Peers></Discovery>"""
 
 _domains: dict[int, Any] = {}
 
@@ -34,8 +36,10 @@ def participant(domain_id: int) -> Any:
         There is no cyclonedds.
     """
     domain = required("cyclonedds.domain", "ros")
-    if stays_on_this_machine() and "CYCLONEDDS_URI" not in os.environ and domain_id not in _domains:
-        _domains[domain_id] = domain.Domain(domain_id, _LOOPBACK)  # lives as long as its participants
+    if "CYCLONEDDS_URI" not in os.environ and domain_id not in _domains:
+        settings = _QUIET + (_LOOPBACK if stays_on_this_machine() else "")
+        text = f'<CycloneDDS><Domain Id="any">{settings}</Domain></CycloneDDS>'
+        _domains[domain_id] = domain.Domain(domain_id, text)  # lives as long as its participants
     return domain.DomainParticipant(domain_id)
 
 

@@ -19,6 +19,7 @@ class Latencies:
     def __init__(self, kept: int = 5000) -> None:
         self._last: deque[float] = deque(maxlen=kept)
         self.longest = 0.0
+        self.longest_of: dict[str, float] = {}
         self.count = 0
 
     def add(self, seconds: float) -> None:
@@ -40,6 +41,9 @@ class Latencies:
             try:
                 return function(*args, **kwargs)
             finally:
-                self.add(time.perf_counter() - begun)
+                took = time.perf_counter() - begun
+                self.add(took)
+                name = function.__name__
+                self.longest_of[name] = max(self.longest_of.get(name, 0.0), took)
 
         return measured  # type: ignore[return-value]

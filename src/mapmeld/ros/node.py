@@ -332,6 +332,9 @@ class MergingNode:
             "callbacks": str(self._latencies.count),
             "callback_ms_99": f"{1e3 * self._latencies.percentile(99):.2f}",
             "callback_ms_max": f"{1e3 * self._latencies.longest:.2f}",
+            "callback_ms_max_of": " ".join(
+                f"{name.strip('_<>')}={1e3 * s:.1f}" for name, s in self._latencies.longest_of.items()
+            ),
             "late_ms_99": f"{1e3 * self._lateness.percentile(99):.2f}",
             "late_ms_max": f"{1e3 * self._lateness.longest:.2f}",
         }
