@@ -143,6 +143,7 @@ class Listener:
         self.statuses: list[dict[str, dict[str, str]]] = []
         self.levels: dict[str, int] = {}
         self.start_poses: list[Any] = []
+        dds.prepare_fastdds()
         self._context = rclpy.Context()
         rclpy.init(context=self._context, domain_id=domain)
         self.node = rclpy.create_node(f"listener_{time.monotonic_ns()}", context=self._context)

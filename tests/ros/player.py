@@ -2,7 +2,7 @@
 
 Each line is a JSON object: {"topic": ..., "map": FILE.npz} publishes a map; {"sleep": seconds} waits;
 {"flood": [topic, FILE.npz, hertz, seconds]} publishes it again and again; {"patch": ...} an update (by cyclonedds).
-Runs as a program of its own: no pytest, no mapmeld.
+Runs as a program of its own.
 """
 
 import array
@@ -15,6 +15,8 @@ import numpy as np
 import rclpy
 from nav_msgs.msg import OccupancyGrid
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from mapmeld.ros import dds
 
 
 def message_of(path: str, changes: dict[str, Any]) -> OccupancyGrid:
@@ -40,6 +42,7 @@ def message_of(path: str, changes: dict[str, Any]) -> OccupancyGrid:
 
 def main() -> None:
     domain = int(sys.argv[1])
+    dds.prepare_fastdds()
     rclpy.init(domain_id=domain)
     node = rclpy.create_node(f"player_{sys.argv[2]}")
     publishers: dict[str, Any] = {}
@@ -77,7 +80,7 @@ def write_patch(domain: int, writers: dict[str, Any], task: dict[str, Any]) -> N
     from cyclonedds.pub import DataWriter
     from cyclonedds.topic import Topic
 
-    from mapmeld.ros import dds, dds_types
+    from mapmeld.ros import dds_types
 
     topic = task["patch"]
     if topic not in writers:

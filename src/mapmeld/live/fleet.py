@@ -124,7 +124,7 @@ class Fleet:
             self._robots[name] = _Robot(grid)
             self._stale = True
             return None
-        if same_map(robot.newest, grid):
+        if same_map(robot.newest, grid) and robot.newest.frame_id == grid.frame_id:
             return None  # the map at hand stays: what has been computed from it is remembered for that object
         why = started_anew(robot.newest, grid)
         robot.newest = grid

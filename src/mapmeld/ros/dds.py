@@ -6,6 +6,7 @@ Where a ROS installation provides tf2_msgs and map_msgs nothing of this is used.
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import Any
 
 from mapmeld.extras import MissingExtraError, required
@@ -53,6 +54,16 @@ def quality(*, latched: bool, reliable: bool = True) -> Any:
         policy.Durability.TransientLocal if latched else policy.Durability.Volatile,
         policy.History.KeepLast(1 if latched else 100),
     )
+
+
+def prepare_fastdds() -> None:
+    """Let Fast DDS not ask for descriptions of types, before its first participant: see the file it is told of.
+
+    A profile that the user has is left as it is.
+    """
+    if "FASTDDS_DEFAULT_PROFILES_FILE" not in os.environ:
+        profile = Path(__file__).with_name("fastdds_profile.xml")
+        os.environ["FASTDDS_DEFAULT_PROFILES_FILE"] = str(profile)
 
 
 def available() -> bool:

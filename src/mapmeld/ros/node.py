@@ -6,6 +6,7 @@ Callbacks only move bytes; maps are taken apart, matched, drawn and put together
 
 from __future__ import annotations
 
+import importlib.util
 import threading
 import time
 from collections.abc import Sequence
@@ -353,8 +354,10 @@ class MergingNode:
     def _serve(self) -> None:
         services = required("std_srvs.srv", "ros")
         texts = required("diagnostic_msgs.srv", "ros").AddDiagnostics
+        # Of their own group: while one waits for its answer, the node's other callbacks go on.
+        group = required("rclpy.callback_groups", "ros").ReentrantCallbackGroup()
         self._services = [
-            self.node.create_service(kind, f"~/{name}", handler)
+            self.node.create_service(kind, f"~/{name}", handler, callback_group=group)
             for kind, name, handler in (
                 (services.Trigger, "save_map", self._save),
                 (services.Trigger, "reset", self._reset),
@@ -386,9 +389,14 @@ class MergingNode:
         return await self._answered(self.matching.wish("reset"), response)
 
     async def _answered(self, answer: Answer, response: Any) -> Any:
-        # The executor goes on with other callbacks until the thread has the answer.
-        future = required("rclpy.task", "ros").Future(executor=self.node.executor)
-        answer.add_done_callback(lambda done: future.set_result(done.result()))
+        executor = self.node.executor
+        future = required("rclpy.task", "ros").Future(executor=executor)
+
+        def resume(done: Answer) -> None:
+            future.set_result(done.result())
+            executor.wake()  # it only looks again at what waits when something wakes it
+
+        answer.add_done_callback(resume)
         response.success, response.message = await future
         return response
 
@@ -420,6 +428,8 @@ def run(
     for module in ("nav_msgs.msg", "geometry_msgs.msg", "diagnostic_msgs.msg", "std_srvs.srv"):
         required(module, "ros")
     executors, external = required("rclpy.executors", "ros"), rclpy.exceptions
+    if importlib.util.find_spec("tf2_msgs") is None:
+        dds.prepare_fastdds()
     rclpy.init(args=["mapmeld", *ros_arguments])
     try:
         _spin(rclpy.create_node(name), robots, executors)
