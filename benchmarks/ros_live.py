@@ -1,7 +1,7 @@
 """Load of the live node: how late its callbacks come, processor time and memory, on real middleware.
 
     python benchmarks/ros_live.py large                 # 4 robots, 2000 x 2000 cells each, 1 Hz, 60 s
-    python benchmarks/ros_live.py replay --seconds 180  # 30 minutes of the example recording's two robots at 10x
+    python benchmarks/ros_live.py replay --seconds 180  # 30 minutes of two robots at 10x
 
 Starts the node, a process of robots and listens itself, all on this machine's loopback (extra ``ros``).
 """
@@ -26,13 +26,13 @@ LARGE = 2000
 
 
 def padded(grid: OccupancyGrid, shift: int) -> OccupancyGrid:
-    """The map within 2000 x 2000 cells."""
+    """Return the map within 2000 x 2000 cells."""
     rows, cols = grid.shape
     return grid.extended(400 + shift, 300, LARGE - cols - 400 - shift, LARGE - rows - 300)
 
 
 def tiled(grid: OccupancyGrid) -> OccupancyGrid:
-    """The map enlarged so that 2000 x 2000 cells are full of what is known: finer cells, the same place."""
+    """Return the map with cells of a fifth the size, so that 2000 x 2000 are full of what is known."""
     import numpy as np
 
     factor = 5
@@ -43,10 +43,11 @@ def tiled(grid: OccupancyGrid) -> OccupancyGrid:
 
 
 def figures(system: LiveSystem, began: float) -> str:
-    """One line of the node's own figures."""
+    """Return one line of the node's own figures."""
     f = system.listener.figures
     names = (
-        "joined", "callbacks", "callback_ms_99", "callback_ms_max", "callback_ms_max_of", "late_ms_99", "late_ms_max",
+        "joined", "callbacks", "callback_ms_99", "callback_ms_max", "callback_ms_max_of", "late_ms_99",
+        "late_ms_max",
         "node_cpu_seconds", "matching_cpu_seconds", "node_memory_mb", "matching_memory_mb", "pairs_waiting",
     )  # fmt: skip
     return f"{time.monotonic() - began:6.1f} s  " + ", ".join(f"{n} {f.get(n, '')}" for n in names)
@@ -56,8 +57,7 @@ def large(seconds: float, full: bool) -> None:
     """Four robots with large maps at 1 Hz, one cell of which changes every time."""
     maps = [mapmeld.load(ROOT / f"examples/maps/robot_{i}.yaml") for i in (1, 2, 3)]
     maps.append(mapmeld.load(ROOT / "examples/maps/robot_1_later.yaml"))
-    make = tiled if full else padded
-    grids = [make(grid) if full else padded(grid, 10 * i) for i, grid in enumerate(maps)]
+    grids = [tiled(grid) if full else padded(grid, 10 * i) for i, grid in enumerate(maps)]
     with live_system() as system:
         robots = [system.robots(f"r{i}") for i in range(4)]
         began = time.monotonic()
@@ -72,7 +72,7 @@ def large(seconds: float, full: bool) -> None:
 
 
 def replay(seconds: float) -> None:
-    """The example recording again and again, its robots at 10 times their pace, with their restarts."""
+    """Replay the example recording again and again, with the restarts of its robots."""
     from mapmeld.io.recordings import map_states
 
     recording = ROOT / "examples/recording/two_robots.mcap"
@@ -84,7 +84,7 @@ def replay(seconds: float) -> None:
         step = 0
         while time.monotonic() - began < seconds:
             for name, paths in files.items():
-                # Back and forth would be no mapping: to the end, then the last map again and again, then anew.
+                # Back and forth would be no mapping: to the end, the last map again and again, then anew.
                 robots.tell(topic=f"/{name}/map", map=paths[min(step % 60, len(paths) - 1)])
             time.sleep(0.8)
             step += 1

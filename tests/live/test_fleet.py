@@ -258,7 +258,7 @@ def test_growing_and_correcting_is_not_starting_anew() -> None:
 @settings(max_examples=25)
 @given(theta=st.floats(0.5, 5.7), x=st.floats(-4, 4), y=st.floats(-4, 4))
 def test_the_same_place_in_another_frame_is_starting_anew(theta: float, x: float, y: float) -> None:
-    # A half turn about its middle lays a rectangle of rooms on itself; its walls may agree by more than chance.
+    # A half turn about its middle lays a rectangle of rooms on itself; its walls may agree.
     if abs(theta - math.pi) > 0.4 and abs(theta % (math.pi / 2)) > 0.3:
         assert started_anew(PLACE, seen_from(PLACE, Pose2(x, y, theta))) is not None
 
@@ -291,7 +291,9 @@ def test_the_canvas_draws_what_merging_draws(T: Pose2) -> None:
     room = cut(PLACE, 0.0, 0.0, 5.0, 4.0)
     drawn = Canvas(0.05, "world").draw({"a": (room, Pose2()), "b": (room, T)}, "colour")
     assert drawn is not None
-    assert abs(drawn.known_area - merge_aligned([room, room], [Pose2(), T]).known_area) < 0.05 * room.known_area
+    assert (
+        abs(drawn.known_area - merge_aligned([room, room], [Pose2(), T]).known_area) < 0.05 * room.known_area
+    )
 
 
 def test_a_canvas_without_end_is_refused_and_the_old_one_stays() -> None:

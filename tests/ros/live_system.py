@@ -1,4 +1,4 @@
-"""The node, robots and a listener as processes of their own, on a DDS domain of their own that stays on this machine."""
+"""The node, robots and a listener as processes of their own, on a DDS domain of their own on the loopback."""
 
 import itertools
 import json
@@ -167,7 +167,9 @@ class Listener:
             self._executor.spin_once(timeout_sec=0.05)
             for message in self._reader.take(10):
                 if hasattr(message, "transforms"):
-                    self.transforms.append({t.child_frame_id: _parent_and_pose(t) for t in message.transforms})
+                    self.transforms.append(
+                        {t.child_frame_id: _parent_and_pose(t) for t in message.transforms}
+                    )
 
     def _on_map(self, message: Any) -> None:
         from mapmeld.io.recordings.messages import grid_from_message

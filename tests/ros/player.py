@@ -1,7 +1,7 @@
 """Robots for the tests: publishes maps as it is told on stdin, until stdin ends.
 
 Each line is a JSON object: {"topic": ..., "map": FILE.npz} publishes a map; {"sleep": seconds} waits;
-{"flood": [topic, FILE.npz, hertz, seconds]} publishes it again and again; {"patch": ...} an update (by cyclonedds).
+{"flood": [topic, FILE.npz, hertz, seconds]} again and again; {"patch": ...} an update (by cyclonedds).
 Runs as a program of its own.
 """
 

@@ -1,4 +1,4 @@
-"""ros2 launch mapmeld_ros mapmeld.launch.py [params_file:=...] [robots:="['robot_1','robot_2']"] [rviz:=true]."""
+"""ros2 launch mapmeld_ros mapmeld.launch.py [params_file:=...] [robots:="['r1','r2']"] [rviz:=true]."""
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument

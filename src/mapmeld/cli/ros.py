@@ -19,7 +19,9 @@ def ros(
     ] = "auto",
     parameters: Annotated[
         list[str] | None,
-        typer.Option("-p", "--param", metavar="NAME:=VALUE", help="A parameter of the node; may be repeated."),
+        typer.Option(
+            "-p", "--param", metavar="NAME:=VALUE", help="A parameter of the node; may be repeated."
+        ),
     ] = None,
     file: Annotated[
         Path | None, typer.Option("--params-file", metavar="YAML", help="A ROS file of parameters.")

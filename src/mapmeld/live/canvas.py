@@ -55,7 +55,7 @@ class Canvas:
         Raises
         ------
         MergeError
-            The merged map would have more than `mapmeld.merging.aligned.MAX_CELLS` cells; nothing has changed then.
+            The merged map would have more than `MAX_CELLS` cells; nothing has changed then.
         ResolutionError, UnknownFusionError
             As `mapmeld.merging.merge_aligned`.
         """
@@ -142,4 +142,3 @@ def _one_lattice(grid: OccupancyGrid, pose: Pose2, resolution: float) -> bool:
         return False
     at = np.array([placed.x, placed.y]) / resolution
     return bool(np.abs(at - np.rint(at)).max() < 1e-6)
-

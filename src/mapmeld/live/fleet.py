@@ -1,7 +1,7 @@
 """A fleet of robots that map: their newest maps in, what is known of where they lie out.
 
-`Fleet` decides, and nothing else: it knows no middleware, no clock and no thread. Its work is cut into pieces of at
-most one match (`Fleet.work`), so that whoever drives it can hand in newer maps between them.
+`Fleet` decides, and nothing else: it knows no middleware, no clock and no thread. Its work is cut into pieces
+of at most one match (`Fleet.work`), so that whoever drives it can hand in newer maps between them.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ class FleetSettings:
 @dataclass(slots=True, eq=False)
 class _Robot:
     newest: OccupancyGrid
-    # The newest map that a match which is used, or a known pose, vouches for: only that is ever drawn. A map in
-    # another frame, by a restart that nothing has noticed yet, is not.
+    # The newest map that a match which is used, or a known pose, vouches for: only that is ever drawn. A map
+    # in another frame, by a restart that nothing has noticed yet, is not.
     vouched: OccupancyGrid | None = None
     version: int = 0  # counts the maps that were vouched for
     starts: int = 1
@@ -86,8 +86,8 @@ class _Robot:
 class Fleet:
     """Joins the newest maps of any number of robots.
 
-    The world frame is that of the first robot, by name, of the first group that is joined, or that in which poses are
-    known. It stays where it is though that robot's map is withdrawn. The merged map has one group, the one
+    The world frame is that of the first robot, by name, of the first group that is joined, or that in which poses
+    are known. It stays where it is though that robot's map is withdrawn. The merged map has one group, the one
     that holds the world frame; other groups, and robots that are in none, are told of, but not drawn.
 
     Parameters
@@ -95,7 +95,7 @@ class Fleet:
     settings
         See there.
     resume
-        ``T_world_robot`` of an earlier fleet: where these robots are joined again, the world frame is where it was.
+        ``T_world_robot`` of an earlier fleet: joined again, these robots keep the world frame where it was.
     """
 
     def __init__(
@@ -223,7 +223,7 @@ class Fleet:
 
     # ------------------------------------------------------------------ the work
     def work(self) -> bool:
-        """Match the pair that has waited longest, if any has new maps; find the poses. Return whether there was one."""
+        """Match the pair that has waited longest, if any has new maps; return whether one has."""
         waiting = [key for key in self._pairs if self._waits(key)] if self.settings.matching else []
         if waiting:
             key = min(waiting, key=lambda key: (self._pairs[key].turn, key))
@@ -264,9 +264,7 @@ class Fleet:
         self._vouch(names, graph)
         poses = self._in_world(names, graph)
         self._poses = {
-            name: self._still(name, T)
-            for name, T in poses.items()
-            if self._robots[name].vouched is not None
+            name: self._still(name, T) for name, T in poses.items() if self._robots[name].vouched is not None
         }
         self._last |= self._poses
 
@@ -277,7 +275,7 @@ class Fleet:
                 assert pair.maps is not None
                 for name, seen in zip((names[match.i], names[match.j]), pair.maps, strict=True):
                     robot = self._robots[name]
-                    # Pairs are looked at in turns: another's map may be older than what is vouched for already.
+                    # Pairs are looked at in turns: another's map may be older than what is vouched for.
                     if robot.vouched is None or seen is robot.newest:
                         robot.vouch(seen)
         for name in self._known:
@@ -314,7 +312,7 @@ class Fleet:
 
     # ------------------------------------------------------------------ what comes out
     def merged(self) -> OccupancyGrid | None:
-        """Return the merged map of the robots that are joined; one without anything known where none are any more.
+        """Return the merged map of the robots that are joined; an empty one where none are any more.
 
         None if none have ever been (since the world frame was set anew).
 

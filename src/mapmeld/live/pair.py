@@ -94,7 +94,5 @@ class Pair:
             sure = max(best.probability or 0.0, CONFIRMED_PROBABILITY)
             if best.verdict is not Verdict.ACCEPTED:
                 best = replace(best, T_a_b=self._confirmed, covariance=None, alternatives=())
-            return replace(
-                best, verdict=Verdict.ACCEPTED, probability=sure, reason="confirmed by the user"
-            )
+            return replace(best, verdict=Verdict.ACCEPTED, probability=sure, reason="confirmed by the user")
         return best

@@ -43,7 +43,7 @@ def started_anew(before: OccupancyGrid, now: OccupancyGrid) -> str | None:
 
 
 def _share(before: OccupancyGrid, cells: Mask, now: OccupancyGrid, there: Mask) -> float:
-    """Return how many of some cells (rows, cols) of a map lie where `there` (of the later map) holds, 0..1."""
+    """Return the share of some cells (rows, cols) of a map that lie where `there` of the later one holds."""
     every = np.flatnonzero(cells)
     if not every.size:
         return 1.0

@@ -102,7 +102,7 @@ class PairReport:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FleetState:
-    """All robots and all pairs, by name; `anchor` is the robot on whose map the world frame hangs, if one is."""
+    """All robots and all pairs, by name; `anchor` is the robot on whose map the world frame hangs."""
 
     robots: tuple[RobotReport, ...] = ()
     pairs: tuple[PairReport, ...] = ()

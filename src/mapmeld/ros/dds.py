@@ -1,4 +1,4 @@
-"""A participant of ROS's DDS domain by `cyclonedds`, for messages whose types have no wheel (`mapmeld.ros.dds_types`).
+"""A participant of ROS's DDS domain by `cyclonedds`, for messages whose types have no wheel (`dds_types`).
 
 Where a ROS installation provides tf2_msgs and map_msgs nothing of this is used.
 """
@@ -57,7 +57,7 @@ def quality(*, latched: bool, reliable: bool = True) -> Any:
 
 
 def prepare_fastdds() -> None:
-    """Let Fast DDS not ask for descriptions of types, before its first participant: see the file it is told of.
+    """Let Fast DDS not ask for descriptions of types, before its first participant.
 
     A profile that the user has is left as it is.
     """

@@ -26,8 +26,8 @@ Answer = Future[tuple[bool, str]]
 class MatchingProcess:
     """A thread that keeps one process busy with what is newest.
 
-    Every method returns at once and can be called from any thread. If the process dies, another one is started; it gets the
-    maps again that were answered for before, not those on which it died.
+    Every method returns at once and can be called from any thread. If the process dies, another one is
+    started; it gets the maps again that were answered for before, not those on which it died.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class MatchingProcess:
             self._changed.notify()
 
     def wish(self, kind: str, *arguments: object) -> Answer:
-        """Ask for something (`mapmeld.ros.worker.Wishes`); the answer says whether it was done, and a sentence."""
+        """Ask for something (`mapmeld.ros.worker.Wishes`); the answer: whether it was done, and a sentence."""
         answer: Answer = Future()
         with self._changed:
             self._number += 1
@@ -95,7 +95,7 @@ class MatchingProcess:
             match kind, arguments:
                 case "know", (name, *_):
                     self._lasting["know", name] = wish
-                case ("confirm" | "forbid" | "release"), (a, b):
+                case (("confirm" | "forbid" | "release"), (a, b)):
                     self._lasting["pair", *sorted((str(a), str(b)))] = wish
                 case "forget", (name,):
                     self._kept.pop(str(name), None)
@@ -144,9 +144,7 @@ class MatchingProcess:
                     return self._end()
                 begun = time.monotonic()
                 draw = begun - drawn >= self.draw_period
-                given = Round(
-                    self._pending, tuple(self._wishes), *self._told, draw, self._now()
-                )
+                given = Round(self._pending, tuple(self._wishes), *self._told, draw, self._now())
                 self._pending, self._wishes, self._told = {}, [], (None, None)
             try:
                 reply = self._ask(given)

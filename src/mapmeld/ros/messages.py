@@ -91,10 +91,8 @@ def grid_from_bytes(data: bytes, received: int, max_cells: int) -> OccupancyGrid
 
 
 def patch_from_bytes(data: bytes, received: int) -> Patch:
-    """Return the patch of a serialised map_msgs/OccupancyGridUpdate, where the ROS installation has that type."""
-    return patch_from_message(
-        _decoded(data, required("map_msgs.msg", EXTRA).OccupancyGridUpdate), received
-    )
+    """Return the patch of a serialised map_msgs/OccupancyGridUpdate, where ROS has that type."""
+    return patch_from_message(_decoded(data, required("map_msgs.msg", EXTRA).OccupancyGridUpdate), received)
 
 
 def _decoded(data: bytes, kind: Any) -> Any:

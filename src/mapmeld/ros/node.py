@@ -234,9 +234,7 @@ class MergingNode:
             )
         elif dds.available():
             if self._updates is None:
-                self._updates = listening.UpdatesByCyclone(
-                    self.node.context.get_domain_id(), self._on_patch
-                )
+                self._updates = listening.UpdatesByCyclone(self.node.context.get_domain_id(), self._on_patch)
             self._updates.listen(heard.name, heard.updates_topic, reliable)
             heard.updates = self._updates
         else:
@@ -412,9 +410,7 @@ def _one(text: str) -> str:
     return name
 
 
-def run(
-    robots: Sequence[str] = ("auto",), ros_arguments: Sequence[str] = (), name: str = "mapmeld"
-) -> None:
+def run(robots: Sequence[str] = ("auto",), ros_arguments: Sequence[str] = (), name: str = "mapmeld") -> None:
     """Run the node until it is interrupted.
 
     Raises

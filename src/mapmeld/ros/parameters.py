@@ -56,7 +56,9 @@ PARAMETERS: Mapping[str, Described] = {
         [""], "Start poses, each 'ROBOT X Y YAW [SIGMA_M SIGMA_RAD]' in metres and radians (or 90deg)."
     ),
     "merging_rate": Described(1.0, "Merged maps per second, at most [Hz].", 0.01, 30.0),
-    "estimation_rate": Described(2.0, "How often new maps are handed to the matching, at most [Hz].", 0.01, 30.0),
+    "estimation_rate": Described(
+        2.0, "How often new maps are handed to the matching, at most [Hz].", 0.01, 30.0
+    ),
     "discovery_rate": Described(1.0, "How often robots are looked for [Hz].", 0.01, 10.0),
     "cpu_share": Described(1.0, "Share of one processor that matching may use, over time.", 0.01, 1.0),
     "max_cells": Described(64_000_000, "Larger maps are refused [cells].", 1, 400_000_000),
@@ -64,7 +66,9 @@ PARAMETERS: Mapping[str, Described] = {
     "max_rate": Described(10.0, "A robot with more maps per second is warned of [Hz].", 0.1, 1000.0),
     "stale_after": Described(60.0, "A robot without a map for so long is marked stale [s].", 0.1, 1e6),
     "method": Described("correlative", "How maps are matched (mapmeld match --method)."),
-    "fusion": Described("colour", "What a cell becomes that several maps know (docs: colour, log-odds, ...)."),
+    "fusion": Described(
+        "colour", "What a cell becomes that several maps know (docs: colour, log-odds, ...)."
+    ),
     "publish_tf": Described(True, "Whether world -> map of each robot is published on /tf_static."),
     "save_path": Described("merged_map", "Where save_map writes: PATH.yaml and PATH.pgm."),
     "save_overwrite": Described(False, "Whether save_map replaces files."),

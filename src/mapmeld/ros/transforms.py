@@ -15,7 +15,7 @@ Transforms = Sequence[tuple[str, str, Pose2]]
 """(parent frame, child frame, T_parent_child)"""
 
 APART = "mapmeld_apart"
-"""Frames of robots that were joined and are no more hang below this one, which nothing connects with the world.
+"""Frames of robots that are joined no more hang below this one, which nothing connects with the world.
 
 A static transform cannot be taken back; but a frame that gets another parent leaves the first one.
 """
@@ -87,16 +87,18 @@ class _ByCyclone:
 
 
 def frames_of(state: FleetState, world: str) -> dict[str, str]:
-    """Return the map frame of each robot, which must be its own: what two share gets the robot's name before it."""
+    """Return the map frame of each robot, its own: what two share gets the robot's name before it."""
     names = [robot.frame_id.removeprefix("/") for robot in state.robots]
     return {
-        robot.name: name if name and name != world and names.count(name) == 1 else f"{robot.name}/{name or 'map'}"
+        robot.name: name
+        if name and name != world and names.count(name) == 1
+        else f"{robot.name}/{name or 'map'}"
         for robot, name in zip(state.robots, names, strict=True)
     }
 
 
 def transforms_of(state: FleetState, world: str, once_joined: set[str]) -> list[tuple[str, str, Pose2]]:
-    """Return the static transforms that tell of a fleet: world to map frame, and where robots have left it, `APART`."""
+    """Return a fleet's static transforms: world to map frame, or `APART` where robots have left it."""
     frames = frames_of(state, world)
     told = []
     for robot in state.robots:

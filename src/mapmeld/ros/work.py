@@ -93,7 +93,7 @@ class Round:
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Something to be said once: what it is about, so that it is not said again and again, and the sentence."""
+    """Something for the log: what it is about, by which it is throttled, and the sentence."""
 
     about: str
     text: str

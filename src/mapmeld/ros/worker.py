@@ -98,7 +98,8 @@ class Worker:
                     notices.append(
                         Notice(
                             f"{name} resolution",
-                            f"{name}: its map has cells of {whole.resolution:g} m now, not {grid.resolution:g} m",
+                            f"{name}: its map has cells of {whole.resolution:g} m now, "
+                            f"not {grid.resolution:g} m",
                         )
                     )
                 grid = whole

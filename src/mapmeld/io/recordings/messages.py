@@ -8,7 +8,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapmeld.errors import MapmeldError
 from mapmeld.extras import required
