@@ -86,9 +86,9 @@ class _Robot:
 class Fleet:
     """Joins the newest maps of any number of robots.
 
-    The world frame is that of the first robot, by name, of the first group that is joined, or that in which poses
-    are known. It stays where it is though that robot's map is withdrawn. The merged map has one group, the one
-    that holds the world frame; other groups, and robots that are in none, are told of, but not drawn.
+    The world frame is that of the first robot, by name, of the first group that is joined, or that in which
+    poses are known. It stays where it is though that robot's map is withdrawn. The merged map has one group,
+    the one that holds the world frame; other groups, and robots that are in none, are told of, but not drawn.
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ class MatchingProcess:
             self._changed.notify()
 
     def wish(self, kind: str, *arguments: object) -> Answer:
-        """Ask for something (`mapmeld.ros.worker.Wishes`); the answer: whether it was done, and a sentence."""
+        """Ask for something (`mapmeld.ros.worker.Wishes`); answers whether it was done, and a sentence."""
         answer: Answer = Future()
         with self._changed:
             self._number += 1
@@ -149,7 +149,7 @@ class MatchingProcess:
             try:
                 reply = self._ask(given)
             except (EOFError, OSError) as error:
-                if self._closing:
+                if self._is_closing():
                     return self._end()
                 self._after_death(given, error)
                 waiting, undrawn = 0, False
@@ -158,6 +158,9 @@ class MatchingProcess:
             if reply.merged is not None:
                 drawn = begun
             self._after(given, reply)
+
+    def _is_closing(self) -> bool:
+        return self._closing
 
     def _ask(self, given: Round) -> Reply:
         if self._pipe is None:
