@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib.util
 import threading
 import time
+import traceback
 from collections.abc import Sequence
 from typing import Any
 
@@ -90,16 +91,16 @@ class MergingNode:
         steady = required("rclpy.clock", "ros")
         clock = steady.Clock(clock_type=steady.ClockType.STEADY_TIME)  # goes on though simulated time stands
         timed = self._latencies.timed
-        self._look_timer = node.create_timer(
-            1 / self._values["discovery_rate"], timed(self._look), clock=clock
-        )
         self._beat = time.monotonic()
         self._timers = [
             node.create_timer(1.0, timed(self._tell), clock=clock),
             node.create_timer(HEARTBEAT, self._on_beat, clock=clock),
         ]
         node.add_on_set_parameters_callback(timed(self._on_parameters))
-        self._look()
+        # Not a callback: the middleware takes its time to tell who is there, and to subscribe.
+        self._closing = threading.Event()
+        self._looking = threading.Thread(target=self._keep_looking, name="discovery", daemon=True)
+        self._looking.start()
         node.get_logger().info(f"merging as {self._merged.topic_name}, transforms by {self._tf_name}")
 
     @property
@@ -108,6 +109,8 @@ class MergingNode:
 
     def close(self) -> None:
         """End the process that matches, and all that listens besides the node."""
+        self._closing.set()
+        self._looking.join(timeout=10)
         self.matching.close()
         if self._updates is not None:
             self._updates.close()
@@ -165,8 +168,6 @@ class MergingNode:
             "method", "known_init_poses", "fusion", "world_frame", "max_cells", "max_robots", "cpu_share",
         }:  # fmt: skip
             self.matching.change(fleet_settings(values), limits(values))
-        if "discovery_rate" in changed and changed is not values:
-            self._look_timer.timer_period_ns = int(1e9 / values["discovery_rate"])
         if "known_poses" in changed:
             poses = known_poses(values)
             for name in self._given_poses.keys() - poses.keys():
@@ -177,6 +178,16 @@ class MergingNode:
             self._given_poses = poses
 
     # ------------------------------------------------------------------ robots
+    def _keep_looking(self) -> None:
+        while True:
+            try:
+                self._look()
+            except Exception:
+                if self.node.context.ok():
+                    self.node.get_logger().error(f"looking for robots failed: {traceback.format_exc()}")
+            if self._closing.wait(1 / self._values["discovery_rate"]) or not self.node.context.ok():
+                return
+
     def _look(self) -> None:
         """Find robots, and listen to each as its publishers allow."""
         topics = dict(self.node.get_topic_names_and_types())
@@ -273,7 +284,7 @@ class MergingNode:
     def _stale(self) -> dict[str, str]:
         stale = {}
         now, after = time.monotonic(), self._values["stale_after"]
-        for name, heard in self._heard.items():
+        for name, heard in list(self._heard.items()):
             if heard.last is None:
                 continue
             if heard.publishers == 0:
