@@ -29,6 +29,7 @@ from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.navigability import navigability
 from mapmeld.cli.rebase import rebase
+from mapmeld.cli.ros import ros
 from mapmeld.cli.settings_help import WithSettings
 from mapmeld.cli.show import show
 from mapmeld.cli.simulate import simulate
@@ -165,4 +166,5 @@ for _command in _TAKES_SETTINGS:
     app.command(cls=WithSettings)(_command)
 for _command in _OTHERS:
     app.command()(_command)
+app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(ros)
 app.add_typer(bag)

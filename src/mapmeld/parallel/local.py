@@ -71,7 +71,7 @@ def _submitted(
 ) -> dict[Future[R], int]:
     futures: dict[Future[R], int] = {}
     # It is here that workers are started.
-    with _one_thread_each(), _not_to_be_interrupted(), contextlib.suppress(BrokenProcessPool):
+    with one_thread_each(), _not_to_be_interrupted(), contextlib.suppress(BrokenProcessPool):
         for number, job in waiting.items():
             futures[pool.submit(_call, function, job)] = number
     return futures
@@ -82,7 +82,8 @@ def _call(function: Callable[..., R], job: Job) -> R:
 
 
 @contextlib.contextmanager
-def _one_thread_each() -> Iterator[None]:
+def one_thread_each() -> Iterator[None]:
+    """Let the numeric libraries of processes that are started meanwhile use one thread."""
     before = {name: os.environ.get(name) for name in _THREAD_SETTINGS}
     os.environ.update(dict.fromkeys(_THREAD_SETTINGS, "1"))
     try:

@@ -8,7 +8,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapmeld.errors import MapmeldError
 from mapmeld.extras import required
@@ -82,7 +81,17 @@ def grid_of(data: bytes, encoding: str, received: int) -> OccupancyGrid | None:
     BadMessageError
         It cannot be decoded, or it is no map.
     """
-    message = decoded(data, GRID, encoding)
+    return grid_from_message(decoded(data, GRID, encoding), received)
+
+
+def grid_from_message(message: Any, received: int) -> OccupancyGrid | None:
+    """Return the map in an OccupancyGrid message that is decoded already, by whatever library; as `grid_of`.
+
+    Raises
+    ------
+    BadMessageError
+        It is no map.
+    """
     info = message.info
     rows, cols = int(info.height), int(info.width)
     cells = _cells_of(message.data, rows, cols)
@@ -105,7 +114,11 @@ def grid_of(data: bytes, encoding: str, received: int) -> OccupancyGrid | None:
 
 def patch_of(data: bytes, encoding: str, received: int) -> Patch:
     """Return the patch in an OccupancyGridUpdate message; parameters and errors as of `grid_of`."""
-    message = decoded(data, UPDATE, encoding)
+    return patch_from_message(decoded(data, UPDATE, encoding), received)
+
+
+def patch_from_message(message: Any, received: int) -> Patch:
+    """Return the patch in an OccupancyGridUpdate message that is decoded already; as `patch_of`."""
     cells = _cells_of(message.data, int(message.height), int(message.width))
     return Patch(int(message.y), int(message.x), cells, stamp_of(message.header, received))
 
@@ -122,7 +135,7 @@ def patched(grid: OccupancyGrid, patch: Patch) -> OccupancyGrid | None:
     return replace(grid, cells=cells, stamp=patch.stamp)
 
 
-def _cells_of(values: NDArray[np.int8], rows: int, cols: int) -> Cells:
+def _cells_of(values: Any, rows: int, cols: int) -> Cells:
     if rows * cols > MAX_CELLS:
         raise BadMessageError(f"a map of {cols} x {rows} cells, more than the {MAX_CELLS:,} that are read")
     if rows * cols != len(values):

@@ -1,0 +1,1 @@
+"""The live ROS 2 node (extra ``ros``): a thin shell around `mapmeld.live`."""

@@ -1,0 +1,236 @@
+"""The node's end of the process that matches: newest maps win, and nobody ever waits for it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+
+from mapmeld.io.recordings.messages import Patch
+from mapmeld.live import FleetSettings
+from mapmeld.parallel.local import one_thread_each
+from mapmeld.ros.work import Incoming, Limits, Notice, Reply, Round, Start, Wish
+from mapmeld.se2 import Pose2
+
+MAX_PATCHES = 500
+"""Updates of a map that may wait; beyond it they are dropped until the next whole map."""
+
+Answer = Future[tuple[bool, str]]
+
+
+class MatchingProcess:
+    """A thread that keeps one process busy with what is newest.
+
+    Every method returns at once and can be called from any thread. If the process dies, another one is
+    started; it gets the maps again that were answered for before, not those on which it died.
+
+    Parameters
+    ----------
+    settings, limits
+        To begin with.
+    now
+        The time of the node [ns].
+    on_reply
+        Called in the thread with every answer.
+    on_notice
+        Called in the thread with what is to be logged.
+    """
+
+    def __init__(
+        self,
+        settings: FleetSettings,
+        limits: Limits,
+        now: Callable[[], int],
+        on_reply: Callable[[Reply], object],
+        on_notice: Callable[[Notice], object],
+    ) -> None:
+        self.period = 0.5  # least time between the beginnings of two rounds with new maps [s]
+        self.draw_period = 1.0  # and between two merged maps [s]
+        self._now, self._on_reply, self._on_notice = now, on_reply, on_notice
+        self._settings, self._limits = settings, limits
+        self._changed = threading.Condition()
+        self._pending: dict[str, Incoming] = {}
+        self._wishes: list[Wish] = []
+        self._answers: dict[int, Answer] = {}
+        self._told: tuple[FleetSettings | None, Limits | None] = (None, None)
+        self._number = 0
+        self._closing = False
+        # What a new process must be told again.
+        self._kept: dict[str, Incoming] = {}
+        self._lasting: dict[tuple[object, ...], Wish] = {}
+        self._poses: dict[str, Pose2] = {}
+        self._process: BaseProcess | None = None
+        self._pipe: Connection | None = None
+        self._thread = threading.Thread(target=self._run, name="matching", daemon=True)
+        self._thread.start()
+
+    # ------------------------------------------------------------------ from the callbacks
+    def put_map(self, name: str, data: bytes, received: int) -> None:
+        """Take the newest map of a robot, serialised; what had waited of that robot is forgotten."""
+        with self._changed:
+            self._pending[name] = Incoming(data, received)
+            self._changed.notify()
+
+    def put_patch(self, name: str, patch: bytes | Patch, received: int) -> None:
+        """Take an update of a robot's map."""
+        with self._changed:
+            incoming = self._pending.setdefault(name, Incoming())
+            if len(incoming.patches) < MAX_PATCHES:
+                incoming.patches.append((patch, received))
+            self._changed.notify()
+
+    def wish(self, kind: str, *arguments: object) -> Answer:
+        """Ask for something (`mapmeld.ros.worker.Wishes`); answers whether it was done, and a sentence."""
+        answer: Answer = Future()
+        with self._changed:
+            self._number += 1
+            wish = Wish(self._number, kind, arguments)
+            self._wishes.append(wish)
+            self._answers[wish.number] = answer
+            match kind, arguments:
+                case "know", (name, *_):
+                    self._lasting["know", name] = wish
+                case (("confirm" | "forbid" | "release"), (a, b)):
+                    self._lasting["pair", *sorted((str(a), str(b)))] = wish
+                case "forget", (name,):
+                    self._kept.pop(str(name), None)
+            self._changed.notify()
+        return answer
+
+    def change(self, settings: FleetSettings, limits: Limits) -> None:
+        """Go on with other settings."""
+        with self._changed:
+            self._told = (settings, limits)
+            self._settings, self._limits = settings, limits
+            self._changed.notify()
+
+    def close(self) -> None:
+        """End the process and the thread."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify()
+            process = self._process
+        if process is not None:
+            process.terminate()
+        self._thread.join(timeout=10)
+
+    @property
+    def process_id(self) -> int | None:
+        """Of the process that matches."""
+        return None if self._process is None else self._process.pid
+
+    # ------------------------------------------------------------------ the thread
+    def _run(self) -> None:
+        waiting, undrawn = 0, False
+        begun = drawn = -1e9
+        while True:
+            with self._changed:
+                while not self._closing:
+                    now = time.monotonic()
+                    due = min(
+                        now if self._wishes or self._told != (None, None) or waiting else now + 3600,
+                        begun + self.period if self._pending else now + 3600,
+                        drawn + self.draw_period if undrawn else now + 3600,
+                    )
+                    if due <= now:
+                        break
+                    self._changed.wait(due - now)
+                if self._closing:
+                    return self._end()
+                begun = time.monotonic()
+                draw = begun - drawn >= self.draw_period
+                given = Round(self._pending, tuple(self._wishes), *self._told, draw, self._now())
+                self._pending, self._wishes, self._told = {}, [], (None, None)
+            try:
+                reply = self._ask(given)
+            except (EOFError, OSError) as error:
+                if self._is_closing():
+                    return self._end()
+                self._after_death(given, error)
+                waiting, undrawn = 0, False
+                continue
+            waiting, undrawn = reply.waiting, reply.undrawn
+            if reply.merged is not None:
+                drawn = begun
+            self._after(given, reply)
+
+    def _is_closing(self) -> bool:
+        return self._closing
+
+    def _ask(self, given: Round) -> Reply:
+        if self._pipe is None:
+            self._start()
+        assert self._pipe is not None
+        self._pipe.send(given)
+        reply: Reply = self._pipe.recv()
+        return reply
+
+    def _start(self) -> None:
+        # "spawn": a fork of a process in which the middleware has threads can deadlock.
+        context = multiprocessing.get_context("spawn")
+        from mapmeld.ros.worker import serve
+
+        mine, its = context.Pipe()
+        with one_thread_each():
+            process = context.Process(target=serve, args=(its,), name="mapmeld matching", daemon=True)
+            process.start()
+        its.close()
+        with self._changed:
+            self._process, self._pipe = process, mine
+        mine.send(Start(self._settings, self._limits, self._poses))
+
+    def _after(self, given: Round, reply: Reply) -> None:
+        for name, incoming in given.maps.items():
+            if incoming.data is not None:
+                self._kept[name] = incoming
+            elif name in self._kept:
+                kept = self._kept[name]
+                self._kept[name] = replace(kept, patches=[*kept.patches, *incoming.patches][-MAX_PATCHES:])
+        self._poses = reply.state.poses
+        for notice in reply.notices:
+            self._on_notice(notice)
+        self._on_reply(reply)
+        for number, (done, sentence) in reply.answers.items():
+            with self._changed:
+                answer = self._answers.pop(number)
+            answer.set_result((done, sentence))
+
+    def _after_death(self, given: Round, error: Exception) -> None:
+        self._end()
+        names = ", ".join(sorted(given.maps)) or "none"
+        self._on_notice(
+            Notice(
+                "process",
+                f"the matching process died ({type(error).__name__}) on new maps of: {names}; it is started "
+                "again with the maps before",
+            )
+        )
+        for wish in given.wishes:
+            with self._changed:
+                answer = self._answers.pop(wish.number)
+            answer.set_result((False, "the matching process died; ask again"))
+        with self._changed:
+            for name, kept in self._kept.items():
+                self._pending.setdefault(name, kept)
+            self._kept = {}
+            for wish in self._lasting.values():
+                if wish.kind in ("know", "forbid"):
+                    again = Wish(self._number + 1, wish.kind, wish.arguments)
+                    self._number += 1
+                    self._answers[again.number] = Future()
+                    self._wishes.append(again)
+        time.sleep(0.5)  # a process that dies at once shall not be started in a frenzy
+
+    def _end(self) -> None:
+        with self._changed:
+            process, pipe, self._process, self._pipe = self._process, self._pipe, None, None
+        if pipe is not None:
+            pipe.close()
+        if process is not None:
+            process.terminate()
+            process.join(timeout=5)

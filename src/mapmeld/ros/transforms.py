@@ -1,0 +1,111 @@
+"""Static transforms on ``/tf_static``: by the ROS installation's tf2_msgs, or else by `cyclonedds`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from mapmeld.extras import MissingExtraError, required
+from mapmeld.live import FleetState
+from mapmeld.ros import dds
+from mapmeld.ros.messages import quaternion, split_time
+from mapmeld.se2 import Pose2
+
+Transforms = Sequence[tuple[str, str, Pose2]]
+"""(parent frame, child frame, T_parent_child)"""
+
+APART = "mapmeld_apart"
+"""Frames of robots that are joined no more hang below this one, which nothing connects with the world.
+
+A static transform cannot be taken back; but a frame that gets another parent leaves the first one.
+"""
+
+
+class StaticTransforms(Protocol):
+    """Publishes all static transforms of the node at once, latched."""
+
+    by: str
+
+    def send(self, transforms: Transforms, nanoseconds: int) -> None:
+        """Publish them; those that were sent before and are not among these are forgotten by late joiners."""
+
+    def close(self) -> None:
+        """Leave."""
+
+
+def static_transforms(node: Any, latched: Any) -> StaticTransforms | None:
+    """Return what can publish them: None if there is neither tf2_msgs nor cyclonedds."""
+    try:
+        return _BySystem(node, required("tf2_msgs.msg", "ros"), latched)
+    except MissingExtraError:
+        pass
+    return _ByCyclone(node.context.get_domain_id()) if dds.available() else None
+
+
+class _BySystem:
+    by = "tf2_msgs"
+
+    def __init__(self, node: Any, messages: Any, latched: Any) -> None:
+        self._messages = messages
+        self._publisher = node.create_publisher(messages.TFMessage, "/tf_static", latched)
+
+    def send(self, transforms: Transforms, nanoseconds: int) -> None:
+        stamped = required("geometry_msgs.msg", "ros").TransformStamped
+        message = self._messages.TFMessage()
+        for parent, child, T in transforms:
+            item = stamped()
+            item.header.frame_id, item.child_frame_id = parent, child
+            item.header.stamp.sec, item.header.stamp.nanosec = split_time(nanoseconds)
+            item.transform.translation.x, item.transform.translation.y = T.x, T.y
+            turn = item.transform.rotation
+            turn.x, turn.y, turn.z, turn.w = quaternion(T.theta)
+            message.transforms.append(item)
+        self._publisher.publish(message)
+
+    def close(self) -> None:
+        """Nothing: the publisher goes with the node."""
+
+
+class _ByCyclone:
+    by = "cyclonedds"
+
+    def __init__(self, domain_id: int) -> None:
+        from mapmeld.ros import dds_types
+
+        quality = dds.quality(latched=True)
+        participant = dds.participant(domain_id)
+        topics, publishing = required("cyclonedds.topic", "ros"), required("cyclonedds.pub", "ros")
+        topic = topics.Topic(participant, "rt/tf_static", dds_types.TFMessage, qos=quality)
+        self._message = dds_types.tf_message
+        self._writer = publishing.DataWriter(participant, topic, qos=quality)
+
+    def send(self, transforms: Transforms, nanoseconds: int) -> None:
+        self._writer.write(self._message(transforms, nanoseconds))
+
+    def close(self) -> None:
+        self._writer = None
+
+
+def frames_of(state: FleetState, world: str) -> dict[str, str]:
+    """Return the map frame of each robot, its own: what two share gets the robot's name before it."""
+    names = [robot.frame_id.removeprefix("/") for robot in state.robots]
+    return {
+        robot.name: name
+        if name and name != world and names.count(name) == 1
+        else f"{robot.name}/{name or 'map'}"
+        for robot, name in zip(state.robots, names, strict=True)
+    }
+
+
+def transforms_of(state: FleetState, world: str, once_joined: set[str]) -> list[tuple[str, str, Pose2]]:
+    """Return a fleet's static transforms: world to map frame, or `APART` where robots have left it."""
+    frames = frames_of(state, world)
+    told = []
+    for robot in state.robots:
+        child = frames[robot.name]
+        if robot.T_world_robot is not None:
+            told.append((world, child, robot.T_world_robot))
+            once_joined.add(child)
+        elif child in once_joined:
+            told.append((APART, child, Pose2()))
+    return told
