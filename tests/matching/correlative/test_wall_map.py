@@ -51,6 +51,18 @@ def test_thick_walls_are_walls_and_have_a_middle(resolution: float, thickness: i
     np.testing.assert_allclose(walls.metres[inside].sum(), 120 * resolution - 0.8, rtol=0.15)
 
 
+@pytest.mark.parametrize("degrees", [20, 45, 70])
+def test_thick_walls_are_not_seen_to_one_side_on_a_slanted_lattice(degrees: int) -> None:
+    T = Pose2(0, 0, math.radians(degrees))
+    walls = walls_of(seen_from(built(10, 2, [(1, 0.9, 9, 1.1)], 0.01), T, 0.1))
+    metric = walls.frame.apply(np.stack([walls.points.real, walls.points.imag], axis=-1))
+    there = T.inverse().apply(metric)
+    inside = (there[:, 0] > 1.5) & (there[:, 0] < 8.5)
+    assert np.median(walls.straight) > 0.3
+    assert there[inside, 1].mean() == pytest.approx(1.0, abs=0.01)
+    assert np.abs(there[inside, 1] - 1.0).mean() < 0.06
+
+
 def test_a_solid_block_is_no_wall() -> None:
     cells = np.full((60, 60), FREE, np.int8)
     cells[20:40, 20:40] = OCCUPIED
