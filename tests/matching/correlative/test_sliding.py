@@ -11,7 +11,7 @@ from ready import walls_of
 from mapmeld.grid import FREE, OCCUPIED, OccupancyGrid
 from mapmeld.matching import match
 from mapmeld.matching.correlative.evidence import Evidence, weigh
-from mapmeld.matching.correlative.matcher import SLIDE_GAIN, Mode, _centred, _fitted
+from mapmeld.matching.correlative.matcher import SLIDE_SOFTNESS, Mode, _centred, _fitted
 from mapmeld.matching.correlative.probability import ProbabilityModel
 from mapmeld.matching.correlative.wall_map import WallMap
 from mapmeld.se2 import Pose2
@@ -56,9 +56,20 @@ def test_a_mode_goes_to_the_middle_of_a_plateau(low: float, high: float) -> None
     assert moved.score == 30.0
 
 
-@pytest.mark.parametrize(("low", "high", "gain"), [(-1.0, 1.0, 30.0), (0.3, 0.5, SLIDE_GAIN / 2)])
-def test_where_nothing_is_gained_a_mode_stays(low: float, high: float, gain: float) -> None:
-    walls, model = walls_of(corridor()), plateau(low, high, gain)
+def test_where_nothing_is_gained_a_mode_stays() -> None:
+    walls, model = walls_of(corridor()), plateau(-0.5, 0.3, 30.0)
+    mode = at_rest(walls, model)
+    assert _centred(walls, walls, mode, model) is mode
+
+
+def test_where_it_may_as_well_be_elsewhere_it_goes_to_the_middle_for_no_gain() -> None:
+    walls, model = walls_of(corridor()), plateau(-0.2, 1.0, 30.0)
+    moved = _centred(walls, walls, at_rest(walls, model), model)
+    assert moved.local == pytest.approx([0.4, 0.0, 0.0], abs=0.02)
+
+
+def test_a_mode_that_is_better_where_it_lies_stays() -> None:
+    walls, model = walls_of(corridor()), plateau(-0.05, 0.05, 5 * SLIDE_SOFTNESS)
     mode = at_rest(walls, model)
     assert _centred(walls, walls, mode, model) is mode
 

@@ -45,6 +45,7 @@ SLIDES = np.arange(-10, 11) * 0.1  # [m]
 SLIDE_SOFTNESS = 2.0  # what scores along the way are divided by: so far they scatter
 SLIDE_GAIN = 1.0  # of score, for which a mode is moved
 SLIDE_KEEPS = 0.6  # share of the walls explained as they lie that it must keep
+SLIDE_WITHIN = 0.5, 0.85  # [m], probability: less sure to be that near, a mode moves if it loses little by it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +61,7 @@ class Mode:
     score
         Of the probability model, as if there were no other modes.
     spread
-        Standard deviation [m] along the direction that is fixed least, where it was estimated.
+        Standard deviation [m] along the direction that is fixed least, if it was moved along it.
     """
 
     local: Doubles
@@ -155,9 +156,12 @@ def _centred(walls_a: WallMap, walls_b: WallMap, mode: Mode, model: ProbabilityM
     local = mode.local + weights @ steps
     (evidence,) = weigh(walls_a, walls_b, local[None])
     score = model.score(evidence)
-    if score < mode.score + SLIDE_GAIN or evidence.hit < SLIDE_KEEPS * mode.evidence.hit:
+    near, sure = SLIDE_WITHIN
+    gain = SLIDE_GAIN if weights[np.abs(SLIDES) < near + 1e-6].sum() > sure else -SLIDE_SOFTNESS
+    if score < mode.score + gain or evidence.hit < SLIDE_KEEPS * mode.evidence.hit:
         return mode  # the walls fix it more exactly than this
-    return Mode(local, evidence, score, math.sqrt(float(weights @ (SLIDES - shift) ** 2)))
+    spread = math.sqrt(float(weights @ (SLIDES - shift) ** 2))
+    return Mode(local, evidence, score, spread)
 
 
 def _distinct(modes: Sequence[Mode]) -> list[Mode]:
