@@ -18,7 +18,7 @@ QUICK = ("--set", "particles=4", "--set", "lskip=2")
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The first 60 scans of the example, 15 s."""
+    """The first 60 scans of the example, 18 s."""
     path = tmp_path_factory.mktemp("slam") / "short.log"
     lines = gzip.decompress(LOG.read_bytes()).decode().splitlines(keepends=True)
     path.write_text("".join(lines[:61]), encoding="utf-8")
@@ -43,7 +43,7 @@ def test_map_trajectory_and_history_are_written(log: Path, tmp_path: Path) -> No
     lines = (out / "history" / "times.txt").read_text().splitlines()
     times = [line.split() for line in lines if not line.startswith("#")]
     states = [(name, float(stamp)) for name, stamp in times]
-    assert 3 < len(states) <= 16
+    assert 3 < len(states) <= 19
     assert f"{len(states)} states" in done.out
     assert load(out / "history" / states[-1][0]) == grid
     assert states[-1][1] == pytest.approx(path[-1, 0])
