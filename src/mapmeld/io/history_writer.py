@@ -19,6 +19,10 @@ TIMES = "times.txt"
 _OURS = re.compile(r"state_\d{5,}\.(yaml|pgm)|times\.txt")
 
 
+class NoStatesError(MapFileError):
+    """A history without a state."""
+
+
 def write_history(
     states: Iterable[OccupancyGrid], folder: AnyPath, *, force: bool = False
 ) -> tuple[Path, ...]:
@@ -47,8 +51,10 @@ def write_history(
 
     Raises
     ------
+    NoStatesError
+        There is no state.
     MapFileError
-        There is no state, or one without a stamp.
+        One has no stamp.
     FolderError
         The folder is not empty (and `force` is not set) or cannot be written.
     """
@@ -68,7 +74,7 @@ def write_history(
             lines.append(f"{name} {float(grid.stamp)!r}")
         names = [line.partition(" ")[0] for line in lines if not line.startswith("#")]
         if not names:
-            raise MapFileError.of(folder, "there is no map to write")
+            raise NoStatesError.of(folder, "there is no map to write")
         write_files([(temporary / TIMES, ["\n".join([*lines, ""]).encode()])])
     return tuple(target / name for name in names)
 
