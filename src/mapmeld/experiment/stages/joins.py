@@ -27,14 +27,8 @@ def join_further(root: Path, matching: MatchingRow, mappings: int) -> JoinRow:
     poses = [Pose2(), Pose2(*matching.T_1_2)]
     waiting = [n for n in range(1, mappings + 1) if n not in members]
     tried = right = 0
-
-    def merged_so_far() -> tuple[float, ...]:
-        nonlocal merged
-        merged = merge_aligned([mapped(root, environment, n).grid for n in members], poses)
-        return (accuracy(merged, truth, first.T_world_map),)
-
-    merged = first.grid
-    accuracies = merged_so_far()
+    merged = merge_aligned([mapped(root, environment, n).grid for n in members], poses)
+    accuracies = [accuracy(merged, truth, first.T_world_map)]
     joined = True
     while waiting and joined:
         joined = False
@@ -50,7 +44,8 @@ def join_further(root: Path, matching: MatchingRow, mappings: int) -> JoinRow:
             members.append(number)
             poses.append(found)
             waiting.remove(number)
-            accuracies += merged_so_far()
+            merged = merge_aligned([mapped(root, environment, n).grid for n in members], poses)
+            accuracies.append(accuracy(merged, truth, first.T_world_map))
     return JoinRow(
         environment=environment,
         mapping_1=matching.mapping_1,
@@ -60,6 +55,6 @@ def join_further(root: Path, matching: MatchingRow, mappings: int) -> JoinRow:
         poses=tuple(numbers(pose) for pose in poses),
         tried=tried,
         right=right,
-        accuracies=accuracies,
+        accuracies=tuple(accuracies),
         seconds=time.process_time() - began,
     )

@@ -35,8 +35,10 @@ def match_histories(root: Path, environment: int, mapping_1: int, mapping_2: int
     over_time: list[tuple[float, bool, float | None]] = []
     right_since: float | None = None
     step: Step | None = None
-    histories = (read_history(mapping_folder(root, environment, n) / HISTORY) for n in (mapping_1, mapping_2))
-    for step in follow(*histories, method=method, strategy=strategy_of(method)):
+    first, second = (
+        read_history(mapping_folder(root, environment, n) / HISTORY) for n in (mapping_1, mapping_2)
+    )
+    for step in follow(first, second, method=method, strategy=strategy_of(method)):
         steps += 1
         if step.best is None or step.best.T_a_b is None or step.stamp is None or centroid is None:
             continue
