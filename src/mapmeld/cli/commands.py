@@ -28,6 +28,7 @@ from mapmeld.cli.graph import graph
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.rebase import rebase
+from mapmeld.cli.reproduce import reproduce
 from mapmeld.cli.show import show
 from mapmeld.cli.simulate import simulate
 from mapmeld.cli.slam import slam
@@ -156,7 +157,7 @@ def _options(
 
 for _command in (
     match, merge, graph, follow, diff, rebase, transform_points, show, explain, demo, benchmark,
-    environment, simulate, slam,
+    environment, simulate, slam, reproduce,
 ):  # fmt: skip
     app.command()(_command)
 app.add_typer(bag)
