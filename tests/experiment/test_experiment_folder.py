@@ -7,6 +7,7 @@ from mapmeld.experiment import ExperimentError, ExperimentSettings
 from mapmeld.experiment import folder as folders
 from mapmeld.experiment.folder import add_time, open_folder, read_row, stage_times, write_row
 from mapmeld.experiment.rows import JoinRow, MatchingRow
+from mapmeld.fingerprint import code_version
 from mapmeld.io import MapFileError
 
 SETTINGS = ExperimentSettings(environments=1, mappings=2)
@@ -152,4 +153,4 @@ def test_the_version_knows_the_code_of_the_stages() -> None:
     home = Path(folders.__file__).parents[1]
     for part in folders._CODE:
         assert (home / part).exists()
-    assert folders.version() != folders.code_version()
+    assert folders.version() != code_version()
