@@ -27,6 +27,7 @@ COMMANDS = (
     "environment",
     "simulate",
     "slam",
+    "reproduce",
     "bag",
 )
 

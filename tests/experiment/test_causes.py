@@ -30,11 +30,12 @@ ROW = MappingRow(
     slam_seconds=1.0,
     seconds=1.0,
 )
+HERE = Pose2()
 ONE = Mapped(office(), Pose2(), ROW)
 TWO = Mapped(office(), Pose2(), replace(ROW, position_error_end=0.7))
 
 
-def cause(T: Pose2 | None, similarity: float = 0.3, of_truth: float = 0.2, truth: Pose2 = Pose2()) -> str:
+def cause(T: Pose2 | None, similarity: float = 0.3, of_truth: float = 0.2, truth: Pose2 = HERE) -> str:
     best = MatchResult(T, Verdict.REJECTED, "no corners", similarity=similarity)
     return cause_of_failure(best, truth, ONE, TWO, of_truth)
 
