@@ -12,14 +12,14 @@ import numpy as np
 from mapmeld.experiment.rows import JoinRow, MatchingRow
 from mapmeld.experiment.stages.mapped import mapped, true_environment
 from mapmeld.grid import UNKNOWN, OccupancyGrid, resample
-from mapmeld.report.canvas import LONG_SIDE_PX, Canvas, Picture, Window, paint, paint_map, whole_scale
+from mapmeld.report.canvas import Canvas, Picture, Window, paint, paint_map, whole_scale
 from mapmeld.report.overlay import overlay_labels
 from mapmeld.report.palette import FLOOR_WHITE, GREEN, UNKNOWN_GREY, colour_of_map
 from mapmeld.report.sheet import Panel, compose
 from mapmeld.se2 import Pose2
 
 _MARGIN = 0.5  # around what is drawn [m]
-_SMALL_PX = 480
+_LARGE_PX, _SMALL_PX = 750, 480
 
 
 def true_map_picture(root: Path, environment: int) -> Picture:
@@ -39,7 +39,7 @@ def overlay_picture(
 
     As the environment lies: map 1 where it truly is, the others where the poses T_first_member lay them.
     """
-    canvas, resolution = _overlaid(root, environment, members, poses, LONG_SIDE_PX)
+    canvas, resolution = _overlaid(root, environment, members, poses, _LARGE_PX)
     legend = [(colour_of_map(i), f"mapping {number}") for i, number in enumerate(members)]
     legend.append((GREEN, "walls in both" if len(members) == 2 else "walls in two or more"))
     return compose([Panel(canvas.picture)], "", legend, canvas.px_per_cell / resolution)
