@@ -26,15 +26,22 @@ def parameters_json(settings: object) -> str:
 
 
 @cache
-def code_version() -> str:
+def code_version(*rooms: str) -> str:
     """Return mapmeld's version with a fingerprint of all that a matcher's answer depends on.
 
     In a version that is being worked on, answers of yesterday's code must not pass for today's.
+
+    Parameters
+    ----------
+    rooms
+        Further files and folders of the package that the answer depends on.
     """
     home = Path(__file__).parent
-    files = [home / "grid.py", home / "se2.py", *(home / "matching").rglob("*")]
+    files = [home / "grid.py", home / "se2.py"]
+    for room in ("matching", *rooms):
+        files += [home / room] if (home / room).is_file() else list((home / room).rglob("*"))
     digest = hashlib.blake2b(digest_size=5)
-    for file in sorted(f for f in files if f.is_file() and f.suffix != ".pyc"):
+    for file in sorted(f for f in files if f.is_file() and f.suffix in (".py", ".json")):
         digest.update(file.relative_to(home).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
     # Not imported above: the package itself names what lies over this module.
     return f"{import_module('mapmeld').__version__}+{digest.hexdigest()}"

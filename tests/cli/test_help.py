@@ -31,6 +31,7 @@ COMMANDS = (
     "environment",
     "simulate",
     "slam",
+    "reproduce",
     "bag",
 )
 

@@ -29,6 +29,7 @@ from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.navigability import navigability
 from mapmeld.cli.rebase import rebase
+from mapmeld.cli.reproduce import reproduce
 from mapmeld.cli.ros import ros
 from mapmeld.cli.settings_help import WithSettings
 from mapmeld.cli.show import show
@@ -160,7 +161,15 @@ def _options(
 _TAKES_SETTINGS: tuple[Callable[..., None], ...] = (
     match, merge, graph, follow, diff, rebase, transform_points, show, explain,
 )  # fmt: skip
-_OTHERS: tuple[Callable[..., None], ...] = (navigability, demo, benchmark, environment, simulate, slam)
+_OTHERS: tuple[Callable[..., None], ...] = (
+    navigability,
+    demo,
+    benchmark,
+    environment,
+    simulate,
+    slam,
+    reproduce,
+)
 
 for _command in _TAKES_SETTINGS:
     app.command(cls=WithSettings)(_command)

@@ -74,14 +74,15 @@ def wanted_environment(
     if config is not None:
         settings = replace(settings, configuration=read_configuration(config))
     if size is not None:
-        width, height = _sides(size)
+        width, height = sides(size)
         settings = replace(settings, width=width, height=height)
     if extra_doors is not None:
         settings = replace(settings, extra_doors=extra_doors)
     return generate(settings, seed), settings
 
 
-def _sides(text: str) -> tuple[int, int]:
+def sides(text: str) -> tuple[int, int]:
+    """Read the sides of a ground, as ``20x15``."""
     try:
         width, height = map(int, text.lower().split("x"))
     except ValueError:
