@@ -22,8 +22,10 @@ from mapmeld.cli.demo import demo
 from mapmeld.cli.diff import diff
 from mapmeld.cli.errors import BAD_INPUT, CLOSED_PIPE, FAULT, INTERRUPTED, NO_MATCH, say
 from mapmeld.cli.explain import explain
+from mapmeld.cli.find import find
 from mapmeld.cli.follow import follow
 from mapmeld.cli.graph import graph
+from mapmeld.cli.index import index
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.rebase import rebase
@@ -152,7 +154,7 @@ def _options(
 
 
 for _command in (
-    match, merge, graph, follow, diff, rebase, transform_points, show, explain, demo, benchmark,
+    match, merge, graph, index, find, follow, diff, rebase, transform_points, show, explain, demo, benchmark,
 ):  # fmt: skip
     app.command()(_command)
 app.add_typer(bag)
