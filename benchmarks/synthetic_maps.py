@@ -1,8 +1,8 @@
 """Random floor plans, and maps of parts of them, for what needs thousands of maps.
 
-A plan is a rectangle split again and again into rooms with doors, with cabinets and columns in them. A map of it is
-what lies within some metres' way of a start point: its floor and the walls around that, with a part of the
-wall cells missing or thickened, in a frame of its own at any angle. The same seed gives the same maps.
+A plan is a rectangle split again and again into rooms with doors, with cabinets in them. A map of it is
+what lies within some metres' way of a start point: its floor and the walls around that, with a part of
+the wall cells missing or thickened, in a frame of its own at any angle. The same seed gives the same maps.
 """
 
 from __future__ import annotations

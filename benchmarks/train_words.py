@@ -2,8 +2,8 @@
 
     python benchmarks/train_words.py [--maps 800] [--words 4096] [--seed 7]
 
-The maps are drawn by `synthetic_maps.py`; no map that figures are measured on has a part in it. The words are
-the centres of k-means (Lloyd 1982) of the views of their walls. The same arguments give the same file on the same machine.
+The maps are drawn by `synthetic_maps.py`; no map that figures are measured on has a part in it. The
+words are the centres of k-means (Lloyd 1982) of the views of their walls.
 """
 
 from __future__ import annotations

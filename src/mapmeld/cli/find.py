@@ -37,7 +37,7 @@ def find(
 ) -> None:
     """Find which maps of an index show the same place as a map, and where.
 
-    The exit code is 0 if a match is accepted (with --candidates-only: if any map looks like it), 1 if none is.
+    The exit code is 0 if a match is accepted (with --candidates-only: if any map looks like it), else 1.
     """
     from mapmeld.cli.maps import load_maps, same_map
     from mapmeld.cli.parameters import effective_parameters

@@ -21,8 +21,8 @@ def index(
 ) -> None:
     """Describe all maps under a folder, so that `mapmeld find` need not match them all.
 
-    An index that is there is brought up to date: maps that have not changed are not read again. --force makes it
-    anew. Files that cannot be read as maps are named and passed over.
+    An index that is there is brought up to date: maps that have not changed are not read again. --force
+    makes it anew. Files that cannot be read as maps are named and passed over.
     """
     from mapmeld.cli.errors import say
     from mapmeld.cli.progress import counting
@@ -49,7 +49,7 @@ def index(
             on_progress=lambda so_far: write_index(so_far, target),
         )
     if not built.index.maps and built.skipped:
-        name, problem = built.skipped[0]
+        _, problem = built.skipped[0]
         raise MapIndexError.of(folder, f"none of its {len(built.skipped)} YAML files is a map, as: {problem}")
     write_index(built.index, target)
     for _, problem in built.skipped:

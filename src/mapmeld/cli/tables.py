@@ -166,7 +166,10 @@ def print_found(found: Sequence[Candidate], index: MapIndex, name: str) -> None:
     if matched:
         table.add_column("", no_wrap=True)
     for candidate in found:
-        row = [Text(printable(_within(candidate.path, index.root))), rounded(candidate.score, 3)]
+        row: list[Text | str] = [
+            Text(printable(_within(candidate.path, index.root))),
+            rounded(candidate.score, 3),
+        ]
         result = candidate.result
         if result is not None:
             numbers = ["-"] * 3 if result.T_a_b is None else _numbers(result.T_a_b)

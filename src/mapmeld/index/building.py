@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,7 +86,8 @@ def build_index(
     names
         Files in it, as from `map_files`.
     known
-        An earlier index of the folder: maps whose files have the size and time that they had are taken from it.
+        An earlier index of the folder: maps whose files have the size and time that they had are taken
+        from it.
     workers
         As for `mapmeld.parallel.run_jobs`.
     on_map

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,7 +29,8 @@ class Candidate:
     score
         How much its signature looks like that of the map, 0..1.
     result
-        The match: ``T_a_b`` with a = the candidate and b = the map that is looked for. None if it was not tried.
+        The match: ``T_a_b`` with a = the candidate and b = the map that is looked for; None if it was not
+        tried.
     problem
         Why it could not be tried; empty if nothing is wrong.
     """
@@ -58,7 +59,7 @@ def candidates_for(
     """
     order, scores = Ranking([m.signature for m in index.maps]).best(signature_of(grid))
     own = None if but is None else but.resolve()
-    found = []
+    found: list[Candidate] = []
     for number, score in zip(order, scores, strict=True):
         if len(found) == top:
             break
@@ -80,8 +81,8 @@ def find(
 ) -> tuple[Candidate, ...]:
     """Find the maps of an index that show the same place as a map, and where in them it lies.
 
-    The `top` maps that look most like it are matched with it, accepted ones come first, the surest at the top.
-    A candidate that cannot be read any more is there with its problem.
+    The `top` maps that look most like it are matched with it; accepted ones come first, the surest at the
+    top. A candidate that cannot be read any more is there with its problem.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """An index as one file.
 
     line 1     ``mapmeld index 1``
-    line 2     JSON of one line: version of the signatures, folder of maps (relative to the file), and of each map its
-               name, image, two stamps and number of words; and a checksum of all that follows
+    line 2     JSON of one line: version of the signatures, folder of maps (relative to the file), and of each
+               map its name, image, two stamps and number of words; and a checksum of all that follows
     the rest   words of all maps, uint16; their counts, uint16; little-endian
 
 Nothing in it is executed, and no size is believed that the file's own size does not bear out.

@@ -12,6 +12,9 @@ from mapmeld.index.signature import Signature, vocabulary
 Doubles = NDArray[np.float64]
 Index = NDArray[np.intp]
 
+_LEAST_RARITY = 0.1
+"""Keeps words that all maps have: in an index of a few maps these may be all there are."""
+
 
 class Ranking:
     """Signatures made ready to be compared with others, many at a time.
@@ -38,7 +41,7 @@ class Ranking:
         length = np.sqrt(np.bincount(owner, value**2, self._count))
         value /= np.where(length > 0, length, 1)[owner]
         # By word: a map that is looked for needs its own words only.
-        order = np.argsort(words, kind="stable")
+        order = np.argsort(words.astype(np.uint16), kind="stable")  # of 16 bits: sorted by radix
         self._owner, self._value = owner[order], value[order].astype(np.float32)
         self._of_word = np.searchsorted(words[order], np.arange(k + 1))
 
@@ -54,19 +57,15 @@ class Ranking:
         return found
 
     def best(self, signature: Signature) -> tuple[Index, Doubles]:
-        """Return the numbers of all signatures that have words in common with this one, and scores, best first."""
+        """Return the numbers of the signatures with words in common with this one, and scores, best first."""
         scores = self.scores(signature)
         order = np.argsort(-scores, kind="stable")
         order = order[scores[order] > 0]
         return order, scores[order]
 
 
-_LEAST_RARITY = 0.1
-"""Keeps words that all maps have: in an index of a few maps these may be all there are."""
-
-
 def likely_pairs(signatures: Sequence[Signature], candidates: int) -> list[tuple[int, int]]:
-    """Return the pairs (i, j), i < j, in which one map is among the `candidates` that look most like the other."""
+    """Return pairs (i, j), i < j, in which one map is among so many that look most like the other."""
     ranking = Ranking(signatures)
     pairs = set()
     for i, signature in enumerate(signatures):

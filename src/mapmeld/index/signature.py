@@ -1,6 +1,7 @@
 """The signature of a map: which words, and how often, describe what its walls look like.
 
-A bag of words (Sivic, Zisserman 2003): every view of a wall counts for the word nearest to it. Where things lie is left out, so two maps that share a part
+A bag of words (Sivic, Zisserman 2003): every view of a wall counts for the word nearest to it. Where
+things lie is left out, so two maps that share a part
 of a place share the words of that part, however each of them is turned, moved, cut or sampled.
 """
 
@@ -20,7 +21,7 @@ from mapmeld.index.views import SIZE, wall_views
 from mapmeld.matching.correlative.wall_map import Floats
 
 VOCABULARY = "words.bin"
-"""File of the words (k, SIZE) in the package, a byte for each number; `benchmarks/train_words.py` writes it."""
+"""File of the words (k, SIZE) in the package, a byte for each number; written by `benchmarks/train_words.py`."""
 
 _METHOD = 1  # changes with the code of this module and of `views`
 
