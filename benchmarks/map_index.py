@@ -1,6 +1,6 @@
 """The map index: recall on maps with known truth, what `find` then answers, and time among many maps.
 
-    python benchmarks/map_index.py DATA [--synthetic 10000] [--parts recall find graph time]
+    python benchmarks/map_index.py DATA [--parts recall find graph time] [--synthetic 10000]
 
 DATA is the folder that holds the data sets `paper`, `radish` and `halmstad` (benchmarks/README.md); their
 maps together are one index. Every map is a query against all others: as it is, turned by a random angle, and cut
@@ -201,7 +201,7 @@ def print_recall(maps: Collection, queries: dict[str, list[tuple[OccupancyGrid, 
             print(f"| {way} | {kind} | " + " | ".join(cells) + " |", flush=True)
     pairs = few.sum() // 2
     print(
-        f"\n{len(maps.paths)} maps, {len(maps.pairs)} pairs that overlap, {pairs} of them by less than half.\n"
+        f"\n{len(maps.paths)} maps, {len(maps.pairs)} pairs that overlap, {pairs} of them by less than half.\n"  # noqa: E501
     )
 
 
@@ -219,7 +219,7 @@ def print_found(maps: Collection, queries: dict[str, list[tuple[OccupancyGrid, P
     index = indexed(maps)
     number = {path: i for i, path in enumerate(maps.paths)}
     print(
-        "| queries | with a right answer | accepted and right | accepted and wrong | not judged | seconds per query |"
+        "| queries | with a right answer | accepted and right | accepted and wrong | not judged | seconds per query |"  # noqa: E501
     )
     print("|---|--:|--:|--:|--:|--:|")
     for kind, asked in queries.items():
@@ -279,7 +279,7 @@ def is_right(maps: Collection, i: int, j: int, T_i_j: Pose2) -> bool | None:
 def print_graph(maps: Collection) -> None:
     """Print what matching only likely pairs costs and saves."""
     print(
-        "| candidates per map | pairs matched | accepted, same building | accepted, other building | seconds |"
+        "| candidates per map | pairs matched | accepted, same building | accepted, other building | seconds |"  # noqa: E501
     )
     print("|--:|--:|--:|--:|--:|")
     for candidates in (None, 10, 5):
@@ -316,7 +316,7 @@ def print_times(maps: Collection) -> None:
 
 
 def print_synthetic(count: int, distinct: int) -> None:
-    """Print the time of a query among many simulated maps, two of each plan, and how often it finds the other."""
+    """Print the time of a query among many simulated maps, two of each plan, and how often it finds the other."""  # noqa: E501
     plans, signatures = [], []
     every = max(1, distinct // QUERIES)
     asked: dict[int, OccupancyGrid] = {}

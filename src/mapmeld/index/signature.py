@@ -21,7 +21,7 @@ from mapmeld.index.views import SIZE, wall_views
 from mapmeld.matching.correlative.wall_map import Floats
 
 VOCABULARY = "words.bin"
-"""File of the words (k, SIZE) in the package, a byte for each number; written by `benchmarks/train_words.py`."""
+"""File of the words (k, SIZE) in the package, a byte for each number, by `benchmarks/train_words.py`."""
 
 _METHOD = 1  # changes with the code of this module and of `views`
 
