@@ -3,8 +3,8 @@
     python benchmarks/map_index.py DATA [--parts recall find graph time] [--synthetic 10000]
 
 DATA is the folder that holds the data sets `paper`, `radish` and `halmstad` (benchmarks/README.md); their
-maps together are one index. Every map is a query against all others: as it is, turned by a random angle, and cut
-by a straight line in a random direction so that 60 or 40 percent of its known area stay, and turned. A map
+maps together are one index. Every map is a query against all others: as it is, turned by a random angle, and
+cut by a straight line in a random direction so that 60 or 40 percent of its known area stay, and turned. A map
 is relevant if it shows the same building ("same place"), or if the data sets list the two as overlapping
 ("overlap"). Recall at k is the number of relevant maps among the first k, divided by k or by how many
 there are, whichever is less, averaged over all queries. "few shared" counts pairs of overlap below 0.5: the

@@ -53,10 +53,10 @@ def test_exit_code_1_if_no_map_shows_the_place(archive: Path) -> None:
 
 def test_json_has_the_transform_into_each_map(archive: Path) -> None:
     assert run("index", archive, "-o", archive.parent / "i").code == 0
-    outcome = run("find", archive / "a.yaml", "--in", archive.parent / "i", "--json", "--top", 1)
+    outcome = run("find", archive / "a.yaml", "--in", archive.parent / "i", "--json")
     found = json.loads(outcome.out)
     assert (found["schema"], found["indexed"]) == ("mapmeld.find/1", 4)
-    (best,) = found["candidates"]
+    best = found["candidates"][0]  # accepted; by looks alone the mirrored map comes before it
     assert best["path"] == str(archive / "b.yaml")
     T = best["match"]["T_a_b"]
     assert Pose2(T["x"], T["y"], T["theta"]).distance_to(Pose2(3, -2, 0.6981))[0] < 0.1
