@@ -75,8 +75,8 @@ def recording(seed: int) -> bytes:
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     definition, _ = store.generate_msgdef(GRID, ros_version=2)
     file = io.BytesIO()
-    # One chunk: a state repeats most of the one before it, which compresses well.
-    writer = writing.Writer(file, chunk_size=1 << 24, compression=writing.CompressionType.ZSTD)
+    # Some chunks, as of a recorder, but large ones: a state repeats most of the one before it.
+    writer = writing.Writer(file, chunk_size=1 << 20, compression=writing.CompressionType.ZSTD)
     writer.start(profile="ros2", library="mapmeld examples")
     schema = writer.register_schema(GRID, "ros2msg", definition.encode())
     channels = {robot: writer.register_channel(f"/{robot}/map", "cdr", schema) for robot in MAPPINGS}

@@ -71,6 +71,16 @@ def test_a_read_only_view_of_a_writable_array_is_copied() -> None:
     assert np.shares_memory(grid.moved(Pose2(1)).cells, grid.cells)
 
 
+def test_a_writable_view_of_a_read_only_array_does_not_reach_a_grid() -> None:
+    cells = np.zeros((2, 3), np.int8)
+    view = cells[:]
+    cells.flags.writeable = False
+    grid = OccupancyGrid(cells, 1.0)
+    view[0, 0] = 100
+    assert not grid.occupied.any()
+    assert not grid.cells.flags.writeable
+
+
 def test_percentages_between_the_thresholds_are_known_but_neither_wall_nor_floor() -> None:
     grid = OccupancyGrid(np.array([[-1, 0, 25, 26, 64, 65, 100]], np.int8), 1.0)
     assert grid.known.tolist() == [[False, True, True, True, True, True, True]]

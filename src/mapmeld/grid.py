@@ -13,6 +13,7 @@ Conventions, used everywhere in mapmeld:
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -33,6 +34,9 @@ FREE_UP_TO = 25
 
 Cells = NDArray[np.int8]
 Mask = NDArray[np.bool_]
+
+# The arrays of all grids, by their id: nobody has ever been able to write to them.
+_frozen: weakref.WeakValueDictionary[int, Cells] = weakref.WeakValueDictionary()
 
 
 class ResolutionError(MapmeldError):
@@ -76,11 +80,11 @@ class OccupancyGrid:
             raise ValueError(f"resolution must be a positive number of metres, not {self.resolution}")
         if not all(map(math.isfinite, (self.origin.x, self.origin.y, self.origin.theta))):
             raise ValueError(f"origin must be finite, not {self.origin}")
-        # A read-only copy: freezing a view would leave the caller's array writable underneath.
-        own = cells.flags.owndata and not cells.flags.writeable
-        if cells.dtype != np.int8 or not own or not cells.flags.c_contiguous:
+        # A read-only copy, as somebody may hold a writable view of any array but those of other grids.
+        if _frozen.get(id(cells)) is not cells:
             cells = np.array(cells, dtype=np.int8, order="C")
             cells.flags.writeable = False
+            _frozen[id(cells)] = cells
         object.__setattr__(self, "cells", cells)
 
     # ------------------------------------------------------------------ what is known

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawing import drawn, hall, office, school, seen_from
@@ -35,6 +37,15 @@ def test_what_came_and_what_went() -> None:
     assert found.match.verdict is Verdict.ACCEPTED
     assert "0.72 m2 of obstacles appeared in 1 place;" in found.summary
     assert "0.40 m2 of obstacles vanished in 1 place;" in found.summary
+
+
+def test_all_that_comes_of_it_is_in_the_earlier_maps_frame_and_of_the_later_moment() -> None:
+    old, new = replace(EARLIER, stamp=3.0, frame_id="map"), replace(LATER, stamp=12.0, frame_id="map_2")
+    found = diff(old, new, T_old_new=Pose2())
+    assert (found.old.frame_id, found.new.frame_id) == ("map", "map")
+    assert (found.old.stamp, found.new.stamp) == (3.0, 12.0)
+    for made in (found.as_map(), found.updated()):
+        assert (made.stamp, made.frame_id) == (12.0, "map")
 
 
 def test_a_map_and_itself() -> None:

@@ -148,6 +148,34 @@ def test_collections_in_collections_without_end() -> None:
         moved_geojson(deep, QUARTER)
 
 
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"type": "Point", "coordinates": [1, 2], "features": [1], "geometries": 5, "geometry": "round"},
+        {"type": "Feature", "geometry": None, "properties": {}, "features": 5, "coordinates": "north"},
+        {"type": "FeatureCollection", "features": [], "geometries": "abc", "coordinates": [[1]]},
+        {"type": "GeometryCollection", "geometries": [], "features": {"a": 1}, "geometry": 3, "bbox": None},
+    ],
+)
+def test_members_that_mean_something_in_other_types_mean_nothing_here(content: Any) -> None:
+    moved = moved_geojson(content, QUARTER)
+    foreign = {key: value for key, value in content.items() if key != "coordinates" or value != [1, 2]}
+    assert foreign.items() <= moved.items()
+    assert position_count(moved) == (content["type"] == "Point")
+    assert json.loads(geojson_text(moved)) == moved
+
+
+texts = st.text(max_size=12) | st.sampled_from(["features", "\0features\0", '"features"', "type"])
+
+
+@given(st.dictionaries(texts, texts | st.lists(texts, max_size=2), max_size=4), st.lists(texts, max_size=3))
+def test_text_says_what_it_was_made_of(members: dict[str, Any], notes: list[str]) -> None:
+    features = [{"type": "Feature", "geometry": None, "properties": {"note": note}} for note in notes]
+    content = {**members, "type": "FeatureCollection", "features": features}
+    assert json.loads(geojson_text(content)) == content
+    assert list(json.loads(geojson_text(content))) == list(content)
+
+
 def test_text_has_a_line_for_every_feature() -> None:
     features = [{"type": "Feature", "geometry": None, "properties": {"name": "\ud800 ü"}} for _ in range(3)]
     content = {"type": "FeatureCollection", "a": 1, "features": features, "b": 2}

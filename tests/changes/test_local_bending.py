@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from drawing import office, seen_from
+from drawing import around, built, office, seen_from
 from floors import bowed, with_box
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -79,6 +79,67 @@ def test_the_displacement_is_linear_between_nodes_and_held_outside(
     u, v = np.clip((at_x - 1) / 4, 0, 1), np.clip((at_y - 1) / 4, 0, 1)
     expected = x * (u + 2j * v) + 1j * y
     assert abs(complex(bending.at(np.array([complex(at_x, at_y)]))[0]) - expected) < 1e-9
+
+
+@settings(max_examples=25)
+@given(st.from_type(Pose2), st.from_type(Pose2))
+def test_what_is_laid_down_comes_from_where_the_displacement_says(frame: Pose2, corner: Pose2) -> None:
+    """Whatever turn the lattice has, and the frame in which the displacement is told."""
+    pattern = np.add.outer(7 * np.arange(40), 3 * np.arange(60)) % 101
+    lattice = OccupancyGrid(np.full((40, 60), -1, np.int8), 0.25, corner)
+    new = OccupancyGrid(pattern.astype(np.int8), 0.25, corner)
+    bending = Bending(frame, 0j, 1.0, np.array([[1.5 + 0.5j, 1.5 + 0.5j], [1.5 + 0.5j, 1.5 + 0.5j]]))
+    laid = bending.laid(new, Pose2(), lattice)
+    shift = Pose2(0.0, 0.0, frame.theta).apply((1.5, 0.5))
+    at = np.floor(new.metres_to_lattice(lattice.centres(np.ones(lattice.shape, bool)) - shift)).astype(int)
+    col, row = at.T
+    inside = (col >= 0) & (col < 60) & (row >= 0) & (row < 40)
+    expected = np.full(at.shape[0], -1)
+    expected[inside] = pattern[row[inside], col[inside]]
+    assert (laid.ravel() == expected).mean() > 0.97, "but for rounding"
+
+
+@settings(max_examples=25)
+@given(st.floats(-3, 3), st.from_type(Pose2))
+def test_where_on_the_lattice_a_place_of_the_frame_lies(turn: float, frame: Pose2) -> None:
+    """A displacement that differs from place to place, on a lattice that lies askew in the frame."""
+    lattice = OccupancyGrid(np.full((30, 30), -1, np.int8), 0.5, frame @ Pose2(4.0, -2.0, turn))
+    # To the right of x = 5 m of the frame, everything comes from 200 m away: from nowhere.
+    nodes = np.zeros((2, 1001), complex)
+    nodes[:, 501:] = 200
+    bending = Bending(frame, -45.0 - 50j, 0.1, nodes)
+    laid = bending.laid(OccupancyGrid(np.zeros((30, 30), np.int8), 0.5, lattice.origin), Pose2(), lattice)
+    x = frame.inverse().apply(lattice.centres(np.ones(lattice.shape, bool)))[:, 0].reshape(lattice.shape)
+    sure = np.abs(x - 5) > 0.3
+    np.testing.assert_array_equal(laid[sure] == 0, x[sure] < 5)
+
+
+@pytest.mark.parametrize("T_old", [Pose2(), Pose2(30, -7, 0.4)])
+def test_the_displacement_is_that_of_the_place_where_things_belong(T_old: Pose2) -> None:
+    """Not of the place where they are drawn, which has a displacement of its own."""
+    partitions = [
+        (x, (0, 2, 1, 3)[k % 4], x + 0.1, (0, 2, 1, 3)[k % 4] + 2.2)
+        for k, x in enumerate(np.arange(1.2, 23, 1.3))
+    ]
+    floor = built(24, 6, [*around(24, 6), *partitions])
+    wide = floor.extended(20, 20, 20, 20)
+
+    def stretched(x: np.ndarray) -> np.ndarray:
+        return np.asarray(0.4 * np.sin(x * 2 * np.pi / 16))
+
+    def displacement(col: np.ndarray, row: np.ndarray) -> np.ndarray:
+        return np.asarray(stretched((col - 20) * 0.05) / 0.05 + 0j * row)
+
+    bent = OccupancyGrid(resample(floor, Pose2(), wide, displacement=displacement), 0.05, wide.origin)
+    bending = bend_onto(floor.moved(T_old), bent, T_old, 1.0)
+    belongs = np.linspace(1, 23, 200)
+    drawn_at = belongs
+    for _ in range(50):
+        drawn_at = belongs + stretched(drawn_at)
+    places = (bending.frame.inverse() @ T_old).apply(np.stack([belongs, np.full(200, 3.0)], axis=1))
+    found = bending.at(places @ np.array([1, 1j]))
+    expected = (belongs - drawn_at) * np.exp(1j * (T_old.theta - bending.frame.theta))
+    assert np.abs(found - expected).mean() < 0.0145
 
 
 @settings(max_examples=20)

@@ -25,10 +25,12 @@ def test_only_the_origin_changes(T: Pose2, origin: Pose2) -> None:
 
 
 def test_on_the_lattice_cell_lies_on_cell() -> None:
-    new = OccupancyGrid(np.array([[37, -1, 100], [0, 66, 1]], np.int8), 0.5)
+    new = OccupancyGrid(np.array([[37, -1, 100], [0, 66, 1]], np.int8), 0.5, Pose2(), 12.0, "map_2")
+    old = OccupancyGrid(OLD.cells, OLD.resolution, OLD.origin, 3.0, "map")
     # Two cells to the right and one down on the earlier map's lattice.
     T = OLD.origin @ Pose2(1.0, -0.5)
-    moved = rebase(new, OLD, T, lattice=True)
+    moved = rebase(new, old, T, lattice=True)
+    assert (moved.stamp, moved.frame_id) == (12.0, "map")
     assert moved.cells.tolist() == [[-1, -1, 37, -1, 100], [-1, -1, 0, 66, 1], [-1] * 5]
     assert moved.resolution == OLD.resolution
     assert moved.origin.theta == OLD.origin.theta

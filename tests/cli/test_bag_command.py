@@ -6,6 +6,7 @@ import json
 import shutil
 from pathlib import Path
 
+import mcap.writer
 import pytest
 from listing import contents
 from running import run, run_for_real
@@ -159,6 +160,24 @@ def test_export_of_what_can_be_read(damaged: Path, tmp_path: Path) -> None:
     assert done.code == 0
     assert done.out.startswith("/robot_1/map: 15 maps in")
     assert "left out" in done.line
+
+
+@pytest.mark.parametrize("topics", [["/map"], ["/map", "/map2"]])
+def test_export_where_every_map_is_bad_says_what_was_left_out(topics: list[str], tmp_path: Path) -> None:
+    with (tmp_path / "bad.mcap").open("wb") as out:
+        writer = mcap.writer.Writer(out)
+        writer.start(profile="ros2", library="")
+        schema = writer.register_schema("nav_msgs/msg/OccupancyGrid", "ros2msg", b"")
+        for topic in topics:
+            channel = writer.register_channel(topic, "cdr", schema)
+            for n in range(3):
+                writer.add_message(channel, n, b"junk", n)
+        writer.finish()  # type: ignore[no-untyped-call]
+    chosen = [word for topic in topics for word in ("--topic", topic)]
+    done = run("bag", "export", tmp_path / "bad.mcap", "-o", tmp_path / "h", "--damaged", "use", *chosen)
+    assert done.code == 2
+    assert done.line.endswith("no map on /map can be read; left out: bytes that are no map (3 times)")
+    assert contents(tmp_path) == {"bad.mcap"}
 
 
 def test_damage_counts_once_for_several_topics(damaged: Path, tmp_path: Path) -> None:

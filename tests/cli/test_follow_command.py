@@ -12,6 +12,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import pytest
@@ -21,7 +22,7 @@ from running import run, run_for_real
 
 import mapmeld
 from mapmeld.cli import follow as command
-from mapmeld.cli.follow_outputs import Interval, Snapshots, read_interval
+from mapmeld.cli.follow_outputs import Interval, Outputs, Snapshots, read_interval
 from mapmeld.grid import OccupancyGrid
 from mapmeld.history import STRATEGIES, Step, follow
 from mapmeld.io import save
@@ -222,6 +223,45 @@ def test_everything_that_can_be_written(histories: tuple[Path, Path], tmp_path: 
     assert pictures[2].stat().st_size > 1000
 
 
+def test_what_cannot_be_drawn_takes_nothing_else_with_it(
+    histories: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """Robot 1 begins anew a thousand kilometres away: no picture holds both."""
+    save(mapmeld.load(histories[0] / "20.yaml").moved(Pose2(1e6, 0, 0)), histories[0] / "30.yaml")
+    pictures = ["--strip", tmp_path / "s.png", "--gif", tmp_path / "g.gif", "--rerun", tmp_path / "r.rrd"]
+    done = run("follow", *histories, "-o", tmp_path / "o", *pictures)
+    assert done.code == 2
+    assert [line.partition("mapmeld: ")[2] for line in done.err.splitlines()] == [
+        f"{tmp_path / name}: the maps lie too far apart, over all states, for one picture"
+        for name in ("s.png", "g.gif")
+    ]
+    assert "T_1_2 " in done.out
+    written = json.loads((tmp_path / "o" / "transform.json").read_text())
+    assert str(tmp_path / "r.rrd") in written["files"]
+    assert str(tmp_path / "s.png") not in written["files"]
+    assert contents(tmp_path) >= {"r.rrd", "o/transform.json", "o/merged.yaml"}
+    assert not contents(tmp_path) & {"s.png", "g.gif"}
+
+
+def test_pictures_that_the_disk_refuses_take_nothing_else_with_them(
+    histories: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    strip = tmp_path / "s.png"
+    finish = Outputs.finish
+
+    def meanwhile(self: Outputs, *args: Any) -> Any:
+        strip.write_text("another's")
+        return finish(self, *args)
+
+    monkeypatch.setattr(Outputs, "finish", meanwhile)
+    done = run("follow", *histories, "-o", tmp_path / "o", "--strip", strip, "--gif", tmp_path / "g.gif")
+    assert done.code == 2
+    assert "exists already" in done.line
+    assert strip.read_text() == "another's"
+    assert (tmp_path / "o" / "transform.json").exists()
+    assert not (tmp_path / "g.gif").exists(), "all pictures or none"
+
+
 def test_a_second_run_replaces_all_of_the_first(
     histories: tuple[Path, Path], elsewhere: Path, tmp_path: Path
 ) -> None:
@@ -248,6 +288,11 @@ def test_snapshots_by_seconds_and_by_states(histories: tuple[Path, Path], tmp_pa
     assert taken(Interval(states=2), steps) == ["state_00004"]
     assert taken(Interval(seconds=8.0), steps) == ["state_00005"]
     assert taken(Interval(seconds=1000.0), steps) == []
+    late = [
+        replace(steps[-1], number=n, stamp=t) for n, t in enumerate([0.0, 100.0, 105.0, 112.0, 119.0, 120.0])
+    ]
+    # Due every 10 s from the first; after a gap the next one is due on the beat, not at once.
+    assert taken(Interval(seconds=10.0), late) == ["state_00001", "state_00003", "state_00005"]
     timeless = [replace(step, stamp=None) for step in steps]
     assert taken(Interval(seconds=1.0), timeless) == []
     assert taken(Interval(states=1), timeless) == ["state_00004", "state_00005"]

@@ -146,8 +146,7 @@ def test_a_second_run_goes_on_from_the_store(tmp_path: Path, monkeypatch: pytest
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends a signal")
-# Not with 2 yet: a worker that is interrupted while it starts now and then says so itself.
-@pytest.mark.parametrize("workers", [1])
+@pytest.mark.parametrize("workers", [1, 2])
 def test_an_interrupted_run_says_so_and_keeps_what_was_done(tmp_path: Path, workers: int) -> None:
     maps = write_maps(tmp_path, "a", "b", "c") * 12  # many pairs
     script = (

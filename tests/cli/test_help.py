@@ -1,8 +1,10 @@
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
+import yaml
 from running import run, run_for_real
 
 import mapmeld
@@ -10,6 +12,8 @@ from mapmeld.changes.diff import MAX_BEND, MIN_AREA, TOLERANCE
 from mapmeld.cli.options import DEFAULT_METHOD, Fusion, WriteMode
 from mapmeld.io import Mode
 from mapmeld.matching import DEFAULT_METHOD as THE_DEFAULT_METHOD
+from mapmeld.matching.alphabet import AlphabetParameters
+from mapmeld.matching.correlative import CorrelativeParameters
 from mapmeld.merging import FUSIONS
 
 COMMANDS = (
@@ -24,6 +28,9 @@ COMMANDS = (
     "explain",
     "demo",
     "benchmark",
+    "environment",
+    "simulate",
+    "slam",
     "bag",
 )
 
@@ -43,6 +50,30 @@ def test_help_names_the_default_method_and_the_way_to_its_settings(command: str)
     words = " ".join(run(command, "--help").out.replace("│", " ").split())
     assert f"[default: {DEFAULT_METHOD}]" in words
     assert "'--set help'" in words
+
+
+@pytest.mark.parametrize(
+    "command", ["match", "merge", "graph", "follow", "diff", "rebase", "transform-points", "show"]
+)
+def test_settings_are_listed_without_maps(command: str) -> None:
+    listed = run(command, "--set", "help")
+    assert (listed.code, listed.err) == (0, "")
+    assert yaml.safe_load(listed.out) == asdict(CorrelativeParameters())
+    for words in (
+        ["--method", "alphabet", "--set=help"],
+        ["a", "--set", "help", "--method=alphabet", "--force"],
+    ):
+        assert yaml.safe_load(run(command, *words).out) == asdict(AlphabetParameters())
+
+
+def test_settings_of_the_one_method_that_is_explained() -> None:
+    assert yaml.safe_load(run("explain", "--set", "help").out) == asdict(AlphabetParameters())
+
+
+def test_settings_of_a_method_that_does_not_exist() -> None:
+    refused = run("match", "--set", "help", "--method", "luck")
+    assert refused.code == 2
+    assert "unknown method 'luck'" in refused.line
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -61,6 +61,8 @@ def printed_by(schema: str, folder: Path) -> Any:
         return run("diff", *write_old_and_new(folder), "-o", folder / "d", "--json")
     if schema == "mapmeld.rebase/1":
         return run("rebase", b, "--onto", a, "-o", folder / "r.yaml", "--json", "--lattice")
+    if schema == "mapmeld.navigability/1":
+        return run("navigability", b, "--truth", a, "--align", "--pairs", "3", "--json")
     (folder / "p.yaml").write_text(
         "points: [{x: 1, y: 2}]\nposes: [{x: 1, y: 2, yaw: 3}]\n"
         "polygons: [{points: [[0, 0], [1, 0], [1, 1]]}]\n"
@@ -80,6 +82,7 @@ def printed_by(schema: str, folder: Path) -> Any:
         "mapmeld.diff/1",
         "mapmeld.rebase/1",
         "mapmeld.transform-points/1",
+        "mapmeld.navigability/1",
     ],
 )
 def test_the_document_lists_what_is_printed(tmp_path: Path, schema: str) -> None:

@@ -173,8 +173,11 @@ def test_names_that_are_no_text_can_be_printed(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="such file names are not to be had on Windows")
-def test_a_name_with_a_line_end_does_not_break_the_table(tmp_path: Path) -> None:
-    folder = tmp_path / "two\nlines \x1b[31m"
+def test_a_name_with_a_line_end_does_not_break_the_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # a short path: a long one would be broken to fit the terminal
+    folder = Path("two\nlines \x1b[31m")
     folder.mkdir()
     a, b = write_maps(folder, "a", "b")
     outcome = run("match", a, b)
@@ -200,3 +203,17 @@ def test_opencv_speaks_no_word(tmp_path: Path) -> None:
     outcome = run_for_real("match", a, torn, "--resolution", "0.05", cwd=tmp_path)
     assert outcome.code == 2
     assert "torn.png" in outcome.line
+
+
+def test_a_map_whose_unknown_space_reads_as_free_is_noted(tmp_path: Path) -> None:
+    a = Path(write_maps(tmp_path, "a")[0])
+    quiet = run("match", a, a)
+    text = a.read_text()
+    assert "free_thresh: 0.196" in text
+    old = tmp_path / "old.yaml"
+    old.write_text(text.replace("free_thresh: 0.196", "free_thresh: 0.25"))
+    outcome = run("match", old, a)
+    assert outcome.err.count("note:") == 1
+    assert f"{old} has nothing unknown, and free_thresh 0.25" in outcome.err
+    assert "0.196" in outcome.err
+    assert "note:" not in quiet.err

@@ -65,6 +65,16 @@ def test_times_and_frames_are_those_of_two_robots(shipped: dict[str, Any]) -> No
     assert gaps[0] != gaps[1]
 
 
+def test_shipped_recording_has_chunks_as_a_recorder_makes_them() -> None:
+    """So that what reads it goes by its index, from one to the next."""
+    with (EXAMPLES / "recording" / make_recording.NAME).open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert len(summary.chunk_indexes) >= 3
+    assert summary.statistics is not None
+    assert summary.statistics.chunk_count == len(summary.chunk_indexes)
+
+
 def test_shipped_recording_is_small() -> None:
     assert (EXAMPLES / "recording" / make_recording.NAME).stat().st_size < 300_000
 

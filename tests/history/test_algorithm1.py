@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from drawing import office, seen_from
+from drawing import cut, office, seen_from
 from growing import T_1_2, T_2_PLACE, two_robots
 
 from mapmeld.history import Change, Standing, Work, algorithm1, follow
@@ -62,7 +62,32 @@ def test_the_verdict_is_that_of_the_states_on_which_it_was_found(played: Algorit
     rescored[:] = [0.2, 0.2]
     found = [played.update((grid, grid), None) for _ in range(3)]
     assert [f.standing for f in found] == [Standing.UNDECIDED] * 2 + [Standing.ACCEPTED]
-    assert [f.change for f in found] == [Change.NONE, Change.FOUND, Change.CONFIRMED]
+    assert [f.change for f in found] == [Change.NONE, Change.NONE, Change.FOUND]
+    assert "moved by 0.00 m" in found[2].why
+
+
+def test_what_is_accepted_no_more_is_accepted_again_when_similar_enough(played: Algorithm1) -> None:
+    grid = office()
+    strict = Algorithm1("alphabet", AlphabetParameters(accept_similarity=0.3))
+    low = result(WRONG, 0.05, Verdict.REJECTED)
+    answers[:] = [result(RIGHT, 0.9), low, low, low]
+    rescored[:] = [0.2, 0.4, 0.4]
+    found = [strict.update((grid, grid), None) for _ in range(4)]
+    assert [f.change for f in found] == [Change.FOUND, Change.WITHDRAWN, Change.FOUND, Change.CONFIRMED]
+    assert [f.best.verdict for f in found if f.best] == [
+        Verdict.ACCEPTED, Verdict.REJECTED, Verdict.ACCEPTED, Verdict.ACCEPTED
+    ]  # fmt: skip
+
+
+def test_the_overlap_is_that_of_the_new_maps(played: Algorithm1) -> None:
+    grid = office()
+    answers[:] = [result(Pose2(), 0.9), result(None, 0.0, Verdict.REJECTED)]
+    rescored[:] = [0.5]
+    played.update((grid, grid), None)
+    half = cut(grid, 0, 0, 8, 12)
+    best = played.update((grid, replace(half, origin=Pose2(12, 0, 0) @ half.origin)), None).best
+    assert best is not None
+    assert best.overlap == pytest.approx(0.5, abs=0.01)
 
 
 def test_a_similarity_below_the_threshold_of_the_method_is_accepted_no_more(played: Algorithm1) -> None:

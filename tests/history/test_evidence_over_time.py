@@ -1,30 +1,33 @@
 """The rules of acceptance, on answers that are made up: what matching says is tested elsewhere."""
 
+import tracemalloc
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
-from drawing import drawn
+from drawing import cut, drawn, office, row_of_rooms, seen_from
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mapmeld.grid import OccupancyGrid
-from mapmeld.history import Change, EvidenceParameters, Standing, Work
+from mapmeld.history import Change, EvidenceParameters, Follower, Standing, Work
 from mapmeld.history import evidence_over_time as module
 from mapmeld.history.evidence_over_time import EvidenceOverTime
 from mapmeld.history.step import Finding, Maps
 from mapmeld.matching import Alternative, MatchResult, Verdict
 from mapmeld.matching.correlative import CorrelativeParameters
+from mapmeld.matching.correlative.matcher import LOOKED_AT
 from mapmeld.se2 import Pose2
 
 HERE, THERE = Pose2(1, 2, 0.3), Pose2(-4, 5, 1.9)
 Said = dict[Pose2, float]
 
 
-def answer(said: Said) -> MatchResult:
+def answer(said: Said, first: Pose2 | None = None) -> MatchResult:
     """What the matcher says where it gives these transforms these probabilities."""
     if not said:
         return MatchResult(None, Verdict.REJECTED, "nothing to match on", 0.0)
-    (best, p), *others = sorted(said.items(), key=lambda item: -item[1])
+    (best, p), *others = sorted(said.items(), key=lambda item: (item[0] != first, -item[1]))
     verdict = Verdict.ACCEPTED if p >= 0.85 else Verdict.REJECTED
     return MatchResult(
         best, verdict, "made up", p, alternatives=tuple(Alternative(T, 0.1, q) for T, q in others)
@@ -37,18 +40,19 @@ class Script:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.said: Said = {}
         self.hidden: set[Pose2] = set()  # what the search misses
+        self.first: Pose2 | None = None  # what explains the most, though it need not be the most probable
         self.searches = 0
-        self.checks = 0
+        self.weighed: list[list[Pose2]] = []
         monkeypatch.setattr(module, "match", self._match)
         monkeypatch.setattr(module, "assess", self._assess)
 
     def _match(self, *_: object) -> MatchResult:
         self.searches += 1
-        return answer({T: p for T, p in self.said.items() if T not in self.hidden})
+        return answer({T: p for T, p in self.said.items() if T not in self.hidden}, self.first)
 
     def _assess(self, a: object, b: object, transforms: Sequence[Pose2], *_: object) -> MatchResult:
-        self.checks += 1
-        return answer({T: self.said.get(T, 0.0) for T in transforms})
+        self.weighed.append(list(transforms))
+        return answer({T: self.said.get(T, 0.0) for T in transforms}, self.first)
 
 
 @pytest.fixture
@@ -183,7 +187,7 @@ def test_what_the_search_misses_is_remembered(script: Script) -> None:
 
 def test_hopeless_guesses_are_not_carried_along(script: Script) -> None:
     play(script, [{HERE: 0.001}, {THERE: 0.002}], areas=[20, 40])
-    assert script.checks == 0
+    assert script.weighed == []
 
 
 def test_a_method_without_probability_gets_one_from_the_walls(
@@ -197,6 +201,86 @@ def test_a_method_without_probability_gets_one_from_the_walls(
     assert found.best is not None
     assert (found.best.T_a_b, found.best.probability) == (THERE, 0.88)
     assert found.best.method == "alphabet"
+
+
+def test_a_method_that_does_not_know_how_probable_it_is_meets_the_rivals_of_the_default_method(
+    script: Script, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    proposal = MatchResult(HERE, Verdict.ACCEPTED, "high", None)
+    default = answer({THERE: 0.5, HERE: 0.4})
+    monkeypatch.setattr(
+        module, "match", lambda a, b, method, _: proposal if method == "alphabet" else default
+    )
+    script.said = {HERE: 0.4, THERE: 0.5}
+    found = EvidenceOverTime("alphabet", None).update(maps(), None)
+    assert found.standing is Standing.UNDECIDED
+    assert script.weighed == [[HERE, THERE]]
+
+
+def test_only_so_many_of_a_methods_proposals_are_weighed(
+    script: Script, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    many = [Pose2(10 * k, 0, 0) for k in range(9)]
+    proposal = MatchResult(
+        many[0], Verdict.REJECTED, "", None, alternatives=tuple(Alternative(T, 0.1) for T in many[1:])
+    )
+    monkeypatch.setattr(
+        module, "match", lambda a, b, method, _: proposal if method == "alphabet" else answer({})
+    )
+    EvidenceOverTime("alphabet", None).update(maps(), None)
+    assert script.weighed == [many[:LOOKED_AT]]
+
+
+def test_rivals_are_weighed_at_every_state_however_unlikely(script: Script) -> None:
+    rivals = [Pose2(10 * k, 0, 0) for k in range(1, LOOKED_AT)]
+    play(script, [{HERE: 0.99} | dict.fromkeys(rivals, 0.001)] * 3, areas=[20, 20, 20])
+    assert script.searches == 1
+    assert [set(weighed) for weighed in script.weighed] == [{HERE, *rivals}] * 2
+
+
+def test_an_accepted_match_keeps_its_rivals_though_another_explains_more(script: Script) -> None:
+    """The better one may be less probable: where next to nothing fixes it in some direction, for one."""
+    elsewhere = Pose2(20, 0, 0)
+    strategy = EvidenceOverTime("correlative", CorrelativeParameters())
+    script.said = {HERE: 0.9}
+    strategy.update(maps(20), None)
+    script.first = THERE
+    script.said = {HERE: 0.7, THERE: 0.2, elsewhere: 0.05}
+    found = strategy.update(maps(60), maps(20))
+    assert found.change is Change.LOWERED
+    assert found.best is not None
+    assert (found.best.T_a_b, found.best.probability) == (HERE, 0.7)
+    assert [o.T_a_b for o in found.best.alternatives] == [THERE, elsewhere]
+    assert [o.probability for o in found.best.alternatives] == [0.2, 0.05]
+
+
+def test_in_a_row_of_rooms_no_method_is_sure() -> None:
+    """One that lists few rivals, or none that fit, would be: whichever room it takes, the walls agree."""
+    rooms = row_of_rooms(6)
+    follower = Follower("hough_spectrum")
+    follower.update_1(rooms)
+    step = follower.update_2(cut(rooms, 4, 0, 12.1, 5))
+    assert step.standing is Standing.UNDECIDED
+    assert step.best is not None
+    assert step.best.probability is not None
+    assert step.best.probability < 0.5
+    assert step.best.method == "hough_spectrum"
+
+
+def test_a_map_that_begins_anew_far_away_costs_no_more() -> None:
+    """Evidence is gathered in patches over what both maps cover: gigabytes, if all between counted."""
+    follower = Follower()
+    follower.update_1(office())
+    follower.update_2(seen_from(office(), Pose2(3, -2, 0.7)))
+    far = replace(office(), origin=Pose2(1e7, 1e7, 0))
+    limit = 200 << 20
+    tracemalloc.start()
+    step = follower.update_1(far)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert step.change in (Change.SWITCHED, Change.WITHDRAWN)
+    assert "map 1 does not lie where it did" in step.why
+    assert most < limit
 
 
 # ---------------------------------------------------------------------- in general

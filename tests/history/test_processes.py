@@ -22,6 +22,11 @@ def test_the_earlier_state_comes_first_and_of_one_moment_that_of_process_1() -> 
     assert order([0, 5, 10], [5, 6]) == [(1, 0), (1, 5), (2, 5), (2, 6), (1, 10)]
 
 
+def test_of_one_moment_all_of_process_1_come_first() -> None:
+    assert [which for which, _ in order([3, 3, 3], [3, 3])] == [1, 1, 1, 2, 2]
+    assert order([0, 3], [3, 3, 4]) == [(1, 0), (1, 3), (2, 3), (2, 3), (2, 4)]
+
+
 def test_either_may_end_first_or_never_begin() -> None:
     assert order([0], [1, 2]) == [(1, 0), (2, 1), (2, 2)]
     assert order([1, 2], []) == [(1, 1), (1, 2)]

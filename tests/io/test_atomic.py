@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mapmeld.io import MapFileError
-from mapmeld.io.atomic import check_targets, write_files
+from mapmeld.io.atomic import check_targets, whole_file, write_files
 
 
 def names(folder: Path) -> list[str]:
@@ -133,3 +133,33 @@ def test_file_systems_without_hard_links(tmp_path: Path, monkeypatch: pytest.Mon
     write_files([(tmp_path / "a", (b"x",)), (tmp_path / "b", (b"y",))])
     assert names(tmp_path) == ["a", "b"]
     assert (tmp_path / "b").read_text() == "y"
+
+
+def test_a_file_that_is_written_bit_by_bit_appears_at_the_end(tmp_path: Path) -> None:
+    with whole_file(tmp_path / "a") as file:
+        file.write(b"one ")
+        assert not (tmp_path / "a").exists()
+        file.write(b"two")
+    assert (tmp_path / "a").read_bytes() == b"one two"
+    assert names(tmp_path) == ["a"]
+
+
+def test_a_file_that_fails_half_way_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "b").write_text("old")
+    for force, name in ((False, "a"), (True, "b")):
+        with pytest.raises(ZeroDivisionError), whole_file(tmp_path / name, force=force) as file:
+            file.write(b"half" * (1 // 0))
+    assert names(tmp_path) == ["b"]
+    assert (tmp_path / "b").read_text() == "old"
+
+
+def test_a_file_that_appears_while_another_is_written_is_safe(tmp_path: Path) -> None:
+    with pytest.raises(MapFileError, match="exists already"), whole_file(tmp_path / "a"):
+        (tmp_path / "a").write_text("theirs")
+    assert (tmp_path / "a").read_text() == "theirs"
+    assert names(tmp_path) == ["a"]
+
+
+def test_a_file_bit_by_bit_where_none_can_be(tmp_path: Path) -> None:
+    with pytest.raises(MapFileError, match="does not exist"), whole_file(tmp_path / "nowhere" / "a"):
+        pass

@@ -47,6 +47,24 @@ def test_a_list_of_times(tmp_path: Path) -> None:
     assert cells_of(folder) == [3, 2, 1], "what the list does not name is no state"
 
 
+@pytest.mark.parametrize("seconds", ["1e308", "-1e308", "9000000001", "-9.1e9", "1e999", "nan"])
+def test_times_that_no_clock_shows(tmp_path: Path, seconds: str) -> None:
+    folder = maps(tmp_path / "h", "a.yaml", "b.yaml")
+    (folder / "times.txt").write_text(f"a 9e9\nb {seconds}\n")
+    with pytest.raises(
+        MapFileError, match=r"line 2: 'NAME\.yaml SECONDS' is needed, .* no time is beyond 9,000,000,000"
+    ):
+        read_history(folder)
+    (folder / "times.txt").write_text("a 9e9\nb -9e9\n")
+    assert read_history(folder).stamps == (-9e9, 9e9)
+
+
+@pytest.mark.parametrize("name", ["9000000001", "9" * 200])
+def test_names_that_are_no_times_any_more(tmp_path: Path, name: str) -> None:
+    with pytest.raises(MapFileError, match="its name is no time"):
+        read_history(maps(tmp_path / "h", "1.yaml", f"{name}.yaml"))
+
+
 def test_states_of_one_moment_stay_in_order(tmp_path: Path) -> None:
     folder = maps(tmp_path / "h", "a.yaml", "b.yaml", "c.yaml")
     (folder / "times.txt").write_text("b.yaml 5\nc.yaml 5\na.yaml 5\n")

@@ -1,6 +1,7 @@
 """Functions for workers, which import them by name."""
 
 import os
+import signal
 import time
 from pathlib import Path
 
@@ -61,3 +62,9 @@ def prepare() -> None:
 
 def times_prepared(_: object) -> int:
     return len(prepared)
+
+
+def deaf(_: object) -> tuple[bool, bool]:
+    """Whether the process began with interruptions held back, and ignores them."""
+    held_back = signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    return held_back, signal.getsignal(signal.SIGINT) is signal.SIG_IGN

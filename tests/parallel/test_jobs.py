@@ -1,5 +1,6 @@
 import multiprocessing
 import os
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ import job_functions as functions
 import numpy as np
 import pytest
 
-from mapmeld.parallel import Shared, WorkerDiedError, run_jobs
+from mapmeld.parallel import Shared, WorkerDiedError, local, run_jobs
 
 WORKERS = pytest.mark.parametrize("workers", [0, 1, 2])
 
@@ -103,3 +104,43 @@ def test_leaving_early_ends_the_workers() -> None:
 def test_a_negative_number_of_workers() -> None:
     with pytest.raises(ValueError, match="cannot be negative"):
         next(run_jobs(functions.add, [(1, 1)], workers=-1))
+
+
+# ---------------------------------------------------------------------- Ctrl-C
+posix = pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signals as POSIX has them")
+
+
+@posix
+def test_an_interruption_while_workers_start_waits_until_they_have() -> None:
+    shown: list[str] = []
+
+    def start() -> None:
+        with local._not_to_be_interrupted():
+            os.kill(os.getpid(), signal.SIGINT)
+            shown.append("went on")
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs the tests may ignore it
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            start()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert shown == ["went on"]
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+@posix
+def test_a_mask_that_was_there_before_stays() -> None:
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGUSR1})
+    try:
+        with local._not_to_be_interrupted():
+            pass
+        assert signal.pthread_sigmask(signal.SIG_BLOCK, []) == {*before, signal.SIGINT, signal.SIGUSR1}
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@posix
+def test_workers_never_take_an_interruption_not_even_before_they_are_ready() -> None:
+    """The mask is what they start with; before that there is nothing in them that could be interrupted."""
+    assert set(results(functions.deaf, [(1,), (2,)], workers=2).values()) == {(True, True)}

@@ -87,6 +87,37 @@ def test_maps_of_different_cells_and_turned_lattices(steps: list[Step]) -> None:
     assert has(strip(film_of(stepping)), GREEN) > 1000
 
 
+def test_maps_are_kept_no_finer_than_they_are_drawn(steps: list[Step]) -> None:
+    cells = np.full((1000, 4000), -1, np.int8)
+    cells[300:900, 100:3900] = 0
+    cells[600, 100:3900] = 100  # one cell thin
+    large = OccupancyGrid(cells, 0.05, Pose2(7.0, -3.0, 0.2))
+    film = film_of([replace(steps[-1], maps=(large, large))])
+    for kept in film.steps()[0].maps:
+        assert kept is not None
+        assert 700 < max(kept.shape) <= 801, "and nothing spent on the unknown border"
+        assert kept.known_area == pytest.approx(large.known_area, rel=0.01)
+        wall, seen = (np.asarray(mask.any(axis=0)) for mask in (kept.occupied, kept.known))
+        assert (wall == seen).all(), "thin walls stay whole"
+        middle = kept.centres(kept.occupied).mean(axis=0)
+        assert np.hypot(*(middle - large.centres(large.occupied).mean(axis=0))) < 0.3
+    same = film_of(steps).steps()[-1]
+    assert same.maps == steps[-1].maps, "small maps are as they were"
+
+
+def test_maps_far_apart_are_drawn_smaller_and_further_not_at_all(steps: list[Step]) -> None:
+    first, second = steps[-1].maps
+    assert first is not None
+    away = [
+        replace(steps[-1], number=9, maps=(first.moved(Pose2(metres, 0, 0)), second)) for metres in (500, 5e5)
+    ]
+    whole = strip(film_of([*steps, away[0]]))
+    assert max(whole.shape) < 5000
+    for draw in (strip, frames):
+        with pytest.raises(PictureError, match="too far apart"):
+            draw(film_of([*steps, away[1]]))
+
+
 # ---------------------------------------------------------------------- the animation
 gifs = pytest.mark.skipif(not hasattr(cv2, "imencodeanimation"), reason="this OpenCV writes no GIF")
 

@@ -8,7 +8,7 @@ from drawing import office, seen_from
 
 from mapmeld.extras import MissingExtraError
 from mapmeld.grid import OccupancyGrid
-from mapmeld.history import Step, follow
+from mapmeld.history import Change, Standing, Step, follow
 from mapmeld.io import MapFileError
 from mapmeld.report.rerun_recording import RerunRecording, check_recording_path
 from mapmeld.se2 import Pose2
@@ -45,6 +45,20 @@ def test_a_recording_reads_back(steps: list[Step], tmp_path: Path) -> None:
     assert "found" in printed
     for timeline in ("step", "time"):
         assert timeline in printed
+
+
+def test_a_merge_that_is_withdrawn_is_shown_no_more(
+    steps: list[Step], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rerun = pytest.importorskip("rerun")
+    recording = RerunRecording()
+    shown: list[tuple[str, object]] = []
+    monkeypatch.setattr(recording._stream, "log", lambda name, what, **_: shown.append((name, what)))
+    recording.take(steps[-1])
+    recording.take(replace(steps[-1], standing=Standing.WITHDRAWN, change=Change.WITHDRAWN))
+    recording.close()
+    merge = [what for name, what in shown if name == "merge"]
+    assert [type(what) for what in merge] == [rerun.EncodedImage, rerun.Clear]
 
 
 def test_states_without_stamps(steps: list[Step], tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ _DEPTHS: Mapping[str, int] = {
     "Polygon": 2,
     "MultiPolygon": 3,
 }
+_MEMBERS: Mapping[str, str] = {"FeatureCollection": "features", "GeometryCollection": "geometries"}
 _GEOMETRIES = (*_DEPTHS, "GeometryCollection")
 
 
@@ -150,14 +151,16 @@ def _box(content: Json, old: Any) -> list[Any] | None:
 
 def _positions(content: Json) -> Iterator[list[float]]:
     """Yield every position of GeoJSON that has been checked."""
-    for inner in (*content.get("features", ()), *content.get("geometries", ())):
-        yield from _positions(inner)
-    if content.get("type") == "Feature":
+    kind = content["type"]  # which alone says what a member of any name means
+    if kind in _MEMBERS:
+        for inner in content[_MEMBERS[kind]]:
+            yield from _positions(inner)
+    elif kind == "Feature":
         if content.get("geometry") is not None:
             yield from _positions(content["geometry"])
-    elif content.get("type") in _DEPTHS:
+    else:
         level = [content["coordinates"]]
-        for _ in range(_DEPTHS[content["type"]]):
+        for _ in range(_DEPTHS[kind]):
             level = [item for items in level for item in items]
         yield from (position for position in level if position)
 
@@ -172,10 +175,13 @@ def geojson_text(content: Json) -> str:
     features = content.get("features")
     if content.get("type") != "FeatureCollection" or not features:
         return json.dumps(content, allow_nan=False) + "\n"
-    mark = "\0features\0"
-    head, tail = json.dumps({**content, "features": mark}, allow_nan=False).split(json.dumps(mark))
     lines = ",\n".join(json.dumps(feature, allow_nan=False) for feature in features)
-    return f"{head}[\n{lines}\n]{tail}\n"
+    members = (
+        f"{json.dumps(name)}: "
+        + (f"[\n{lines}\n]" if name == "features" else json.dumps(value, allow_nan=False))
+        for name, value in content.items()
+    )
+    return f"{{{', '.join(members)}}}\n"
 
 
 def changes_geojson(diff: MapDiff, old_name: str) -> Json:

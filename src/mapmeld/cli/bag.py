@@ -15,7 +15,7 @@ from mapmeld.cli.errors import say
 from mapmeld.cli.options import FolderOut, Force, Json
 
 if TYPE_CHECKING:
-    from mapmeld.io.recordings import RecordingInfo
+    from mapmeld.io.recordings import MapStates, RecordingInfo
 
 bag = typer.Typer(
     name="bag", help="Look into recordings: rosbag1, rosbag2, MCAP (extra 'bags').", no_args_is_help=True
@@ -75,10 +75,8 @@ def export(
 
     Several topics get a folder each, below DIR. The folder appears when it is complete, or not at all.
     """
-    from mapmeld.cli.progress import counted
     from mapmeld.cli.tables import print_lines
     from mapmeld.io.folders import check_folder, whole_folder
-    from mapmeld.io.history_writer import write_history
     from mapmeld.io.recordings import map_states
 
     check_folder(out, force=force)
@@ -87,7 +85,7 @@ def export(
     left_out: Counter[str] = Counter()
     if len(topics) < 2:
         states = map_states(file, *topics, damaged=damaged.value)
-        maps = write_history(counted(states, f"Exporting {states.topic}"), out, force=force)
+        maps = _write(file, states, out, force)
         written[states.topic] = out, len(maps)
         left_out += states.left_out
     else:
@@ -96,15 +94,26 @@ def export(
         with whole_folder(out, force=force, ours=()) as folder:
             for name in topics:
                 states = map_states(file, name, damaged=damaged.value)
-                maps = write_history(
-                    counted(states, f"Exporting {states.topic}"), folder / folders[name], force=force
-                )
+                maps = _write(file, states, folder / folders[name], force)
                 written[states.topic] = out / folders[name], len(maps)
                 left_out += states.left_out - states.damage
                 damage = states.damage
         left_out += damage  # the same for all
     print_lines(*(f"{name}: {count} maps in {place}" for name, (place, count) in written.items()))
     _say_left_out(file, left_out)
+
+
+def _write(file: str, states: MapStates, folder: Path, force: bool) -> tuple[Path, ...]:
+    from mapmeld.cli.progress import counted
+    from mapmeld.io.history_writer import NoStatesError, write_history
+    from mapmeld.io.recordings import RecordingError
+
+    try:
+        return write_history(counted(states, f"Exporting {states.topic}"), folder, force=force)
+    except NoStatesError:
+        lost = "; ".join(_left_out_said(states.left_out))
+        problem = f"no map on {states.topic} can be read" + (f"; left out: {lost}" if lost else "")
+        raise RecordingError.of(file, problem) from None
 
 
 def _folders_of(topics: list[str]) -> dict[str, str]:
@@ -151,5 +160,9 @@ def _print(found: RecordingInfo) -> None:
 
 def _say_left_out(file: str, left_out: Mapping[str, int]) -> None:
     """Say on stderr what of a recording was not used."""
-    for reason, times in sorted(left_out.items()):
-        say(f"note: {file}: left out: {reason}" + (f" ({times} times)" if times > 1 else ""))
+    for text in _left_out_said(left_out):
+        say(f"note: {file}: left out: {text}")
+
+
+def _left_out_said(left_out: Mapping[str, int]) -> list[str]:
+    return [reason + (f" ({times} times)" if times > 1 else "") for reason, times in sorted(left_out.items())]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Annotated, Any
 
@@ -20,6 +20,7 @@ from mapmeld.cli.bag import bag
 from mapmeld.cli.benchmark import benchmark
 from mapmeld.cli.demo import demo
 from mapmeld.cli.diff import diff
+from mapmeld.cli.environment import environment
 from mapmeld.cli.errors import BAD_INPUT, CLOSED_PIPE, FAULT, INTERRUPTED, NO_MATCH, say
 from mapmeld.cli.explain import explain
 from mapmeld.cli.find import find
@@ -28,8 +29,12 @@ from mapmeld.cli.graph import graph
 from mapmeld.cli.index import index
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
+from mapmeld.cli.navigability import navigability
 from mapmeld.cli.rebase import rebase
+from mapmeld.cli.settings_help import WithSettings
 from mapmeld.cli.show import show
+from mapmeld.cli.simulate import simulate
+from mapmeld.cli.slam import slam
 from mapmeld.cli.transform_points import transform_points
 from mapmeld.errors import MapmeldError
 
@@ -153,8 +158,13 @@ def _options(
     pass
 
 
-for _command in (
-    match, merge, graph, index, find, follow, diff, rebase, transform_points, show, explain, demo, benchmark,
-):  # fmt: skip
+_TAKES_SETTINGS: tuple[Callable[..., None], ...] = (
+    match, merge, graph, find, follow, diff, rebase, transform_points, show, explain,
+)  # fmt: skip
+_OTHERS: tuple[Callable[..., None], ...] = (index, navigability, demo, benchmark, environment, simulate, slam)
+
+for _command in _TAKES_SETTINGS:
+    app.command(cls=WithSettings)(_command)
+for _command in _OTHERS:
     app.command()(_command)
 app.add_typer(bag)

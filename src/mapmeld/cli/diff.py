@@ -132,7 +132,10 @@ def _write(found: MapDiff, paths: list[str], out: Path, force: bool) -> list[Pat
     name_old, name_new = names_of(paths)
     updated = found.updated()
     with whole_folder(out, force=force, ours=OURS) as folder:
-        picture = changes(found, f"From {name_old} to {name_new}: {found.summary}.")
+        numbers = (
+            " Numbers are those in changes.geojson; a paler hem makes a change seen." if found.regions else ""
+        )
+        picture = changes(found, f"From {name_old} to {name_new}: {found.summary}.{numbers}")
         text = geojson_text(changes_geojson(found, name_old))
         files = [
             write_picture(picture, folder / "changes.png"),

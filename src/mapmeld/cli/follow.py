@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mapmeld.cli.errors import NO_MATCH
+from mapmeld.cli.errors import BAD_INPUT, NO_MATCH, say
 from mapmeld.cli.options import DEFAULT_METHOD, Force, Method, ParamsFile, Settings
 
 if TYPE_CHECKING:
@@ -104,6 +104,10 @@ def follow(
         from mapmeld.cli.follow_table import print_outcome
 
         print_outcome(last, outputs.files)
+    for problem in outputs.problems:
+        say(problem)
+    if outputs.problems:
+        raise typer.Exit(BAD_INPUT)
     if last is None or last.standing is not Standing.ACCEPTED:
         raise typer.Exit(NO_MATCH)
 

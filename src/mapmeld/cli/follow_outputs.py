@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from mapmeld.cli.json_output import Fields, as_json, follow_fields
+from mapmeld.errors import MapmeldError
 from mapmeld.history import Change, Step
 from mapmeld.io import save
 from mapmeld.io.atomic import write_files
@@ -62,7 +63,7 @@ class Outputs:
     """Takes the steps as they come, and writes what is wanted.
 
     As a context it holds the folder back: unless the block ends without an error, it does not appear.
-    `files` are the files written, known after `finish`.
+    After `finish`, `files` are the files written, and `problems` says which pictures are not there and why.
 
     Raises
     ------
@@ -72,6 +73,7 @@ class Outputs:
 
     def __init__(self, wanted: Wanted) -> None:
         self.files: list[Path] = []
+        self.problems: list[str] = []
         self._wanted = wanted
         self._changes: list[Step] = []
         self._film: Film | None = None
@@ -135,21 +137,17 @@ class Outputs:
         strategy: str,
         seconds: float,
     ) -> Fields:
-        """Write everything; return the outcome as JSON fields."""
-        wanted, force = self._wanted, self._wanted.force
-        drawable = last is not None and None not in last.maps
-        if wanted.strip is not None and self._film is not None and drawable:
-            from mapmeld.report import write_picture
-            from mapmeld.report.film import strip
+        """Write everything; return the outcome as JSON fields.
 
-            self.files.append(write_picture(strip(self._film), wanted.strip, force=force))
-        if wanted.gif is not None and self._film is not None and drawable:
-            from mapmeld.report.film import frames, write_gif
-
-            self.files.append(write_gif(frames(self._film), wanted.gif, force=force))
-        if wanted.rerun is not None and self._recording is not None:
-            self.files.append(self._recording.save(wanted.rerun, force=force))
-            self._recording = None
+        What cannot be drawn takes nothing else with it: `-o` holds what hours of mapping came to.
+        """
+        wanted = self._wanted
+        pictures = self._pictures(last is not None and None not in last.maps)
+        try:
+            write_files(pictures, force=wanted.force)
+            self.files += [path for path, _ in pictures]
+        except MapmeldError as error:
+            self.problems.append(str(error))
         written: list[Path] = []
         if self._folder is not None:
             merged = None if last is None else last.merged()
@@ -164,6 +162,35 @@ class Outputs:
         if self._folder is not None:
             write_files([(self._folder / TRANSFORM, [(as_json(outcome) + "\n").encode()])])
         return outcome
+
+    def _pictures(self, drawable: bool) -> list[tuple[Path, list[bytes]]]:
+        """Return strip, animation and recording as files to write."""
+        found: list[tuple[Path, list[bytes]]] = []
+        wanted = self._wanted
+        draw: list[tuple[Path | None, Callable[[Film], bytes]]] = [(wanted.strip, _strip), (wanted.gif, _gif)]
+        for path, drawn in draw:
+            if path is not None and self._film is not None and drawable:
+                try:
+                    found.append((path, [drawn(self._film)]))
+                except MapmeldError as error:
+                    self.problems.append(f"{path}: {error}")
+        if wanted.rerun is not None and self._recording is not None:
+            found.append((wanted.rerun, [self._recording.close()]))
+            self._recording = None
+        return found
+
+
+def _strip(film: Film) -> bytes:
+    from mapmeld.report.film import strip
+    from mapmeld.report.png import png_bytes
+
+    return png_bytes(strip(film))
+
+
+def _gif(film: Film) -> bytes:
+    from mapmeld.report.film import frames, gif_bytes
+
+    return gif_bytes(frames(film))
 
 
 class Snapshots:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from mapmeld.changes import MapDiff
     from mapmeld.cli.placement import Placement
+    from mapmeld.evaluation import Navigability, Reach
     from mapmeld.grid import OccupancyGrid
     from mapmeld.history import Step
     from mapmeld.index import Candidate, MapIndex
@@ -33,6 +34,7 @@ BAG_INFO_SCHEMA = "mapmeld.bag.info/1"
 DIFF_SCHEMA = "mapmeld.diff/1"
 REBASE_SCHEMA = "mapmeld.rebase/1"
 TRANSFORM_POINTS_SCHEMA = "mapmeld.transform-points/1"
+NAVIGABILITY_SCHEMA = "mapmeld.navigability/1"
 
 STEP_SCHEMA = "mapmeld.follow.step/1"
 FOLLOW_SCHEMA = "mapmeld.follow/1"
@@ -233,7 +235,7 @@ def diff_fields(
         "mapmeld": __version__,
         "maps": {"old": paths[0], "new": paths[1]},
         "T_old_new": None if diff is None else pose_fields(diff.T_old_new),
-        "match": _how_matched(match, parameters),
+        "match": how_matched(match, parameters),
         "bend": None if diff is None else diff.bend,
         "areas": None
         if diff is None
@@ -324,7 +326,7 @@ def rebase_fields(
         "mapmeld": __version__,
         "maps": {"old": paths[0], "new": paths[1]},
         "T_old_new": pose_fields(placed.T_a_b),
-        "match": _how_matched(placed.match, parameters),
+        "match": how_matched(placed.match, parameters),
         "lattice": lattice,
         "origin": pose_fields(moved.origin),
         "files": [str(file) for file in files],
@@ -344,13 +346,67 @@ def transform_points_fields(
         "mapmeld": __version__,
         "maps": {"from": maps[0], "to": maps[1]},
         "T_to_from": pose_fields(placed.T_a_b),
-        "match": _how_matched(placed.match, parameters),
+        "match": how_matched(placed.match, parameters),
         "count": dict(count),
         "files": [str(file) for file in files],
     }
 
 
-def _how_matched(match: MatchResult | None, parameters: Any) -> Fields | None:
+def navigability_fields(
+    paths: tuple[str, str | None],
+    T_truth_map: Pose2 | None,
+    match: Fields | None,
+    settings: Mapping[str, Any],
+    reached: Reach,
+    found: Navigability | None,
+    seconds: float,
+) -> Fields:
+    """Return the fields of schema mapmeld.navigability/1."""
+    return {
+        "schema": NAVIGABILITY_SCHEMA,
+        "mapmeld": __version__,
+        "map": paths[0],
+        "truth": paths[1],
+        "T_truth_map": pose_fields(T_truth_map),
+        "match": match,
+        "settings": dict(settings),
+        "reach": asdict(reached),
+        "compared": None if found is None else _compared_fields(found),
+        "seconds": seconds,
+    }
+
+
+def _compared_fields(found: Navigability) -> Fields:
+    ratios = found.length_ratios
+    return {
+        "pairs": found.pairs,
+        "reachable_map": found.reachable_map,
+        "reachable_truth": found.reachable_truth,
+        "reachable_both": found.reachable_both,
+        "false_passages": found.false_passages,
+        "false_blocks": found.false_blocks,
+        "length_ratio": {
+            "median": found.length_ratio,
+            "mean": sum(ratios) / len(ratios) if ratios else None,
+            "least": min(ratios, default=None),
+            "greatest": max(ratios, default=None),
+        },
+        "ways": [
+            {
+                "start": list(way.start),
+                "goal": list(way.goal),
+                "length": way.length,
+                "true_length": way.true_length,
+                "drivable": way.drivable,
+                "false_passage": way.false_passage,
+                "false_block": way.false_block,
+            }
+            for way in found.ways
+        ],
+    }
+
+
+def how_matched(match: MatchResult | None, parameters: Any) -> Fields | None:
     """Return how maps were matched and what came of it; None for a transform that was given."""
     if match is None:
         return None

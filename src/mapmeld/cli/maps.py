@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mapmeld.cli.errors import say
+
 if TYPE_CHECKING:
     from mapmeld.grid import OccupancyGrid
     from mapmeld.io import Mode
@@ -21,7 +23,7 @@ def load_maps(paths: Sequence[str], resolution: float | None) -> list[OccupancyG
         A map cannot be read, a resolution is given though no map needs one, or two maps have
         cells of such different sizes that one of them must be wrong.
     """
-    from mapmeld.grid import MAX_RATIO
+    from mapmeld.grid import ResolutionError, check_resolutions
     from mapmeld.io import MapFileError, format_of, load
 
     bare = [format_of(path) == "image" for path in paths]
@@ -32,14 +34,29 @@ def load_maps(paths: Sequence[str], resolution: float | None) -> list[OccupancyG
         for path, is_bare in zip(paths, bare, strict=True)
     ]
     for path, grid in zip(paths, grids, strict=True):
-        cells = (grids[0].resolution, grid.resolution)
-        if max(cells) > MAX_RATIO * min(cells):
-            raise MapFileError.of(
-                path,
-                f"has cells of {cells[1]:g} m, {paths[0]} of {cells[0]:g} m, which is more than a factor of "
-                f"{MAX_RATIO} apart; check the resolutions",
-            )
+        try:
+            check_resolutions(grids[0], grid)
+        except ResolutionError as error:
+            raise MapFileError(f"{paths[0]} and {path}: {error}") from error
+        _note_unknown_read_as_free(path, grid)
     return grids
+
+
+def _note_unknown_read_as_free(path: str, grid: OccupancyGrid) -> None:
+    """Say of a map that its unknown space was saved so that every reader takes it for floor.
+
+    nav2 wrote grey 205 for unknown and beside it a free_thresh of 0.25, which makes 205 free.
+    """
+    from mapmeld.io import format_of
+    from mapmeld.io.map_server import OLD_FREE_THRESH, read_description
+
+    if grid.known.all() and grid.cells.size and format_of(path) == "map_server":
+        described = read_description(path)
+        if described.mode == "trinary" and described.free_thresh == OLD_FREE_THRESH:
+            say(
+                f"note: {path} has nothing unknown, and free_thresh {OLD_FREE_THRESH:g}: older nav2 saved "
+                "maps so that unknown space reads as free; if so here, write free_thresh: 0.196 in it"
+            )
 
 
 def names_of(paths: Sequence[str]) -> list[str]:

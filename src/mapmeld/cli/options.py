@@ -37,7 +37,7 @@ Settings = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="One setting of the method; may be repeated. '--set help' lists all there are.",
+        help="One setting of the method; may be repeated. '--set help' alone lists all there are.",
     ),
 ]
 Resolution = Annotated[

@@ -8,14 +8,11 @@ import types
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from mapmeld.errors import MapmeldError
 from mapmeld.io import MapFileError
 from mapmeld.io.plain_yaml import Scalar, read_fields, short
-
-if TYPE_CHECKING:
-    from mapmeld.matching import Method
 
 
 class ParametersError(MapmeldError):
@@ -36,8 +33,9 @@ def effective_parameters(method: str, file: Path | None, settings: Sequence[str]
     from mapmeld.matching.match import method_named
 
     chosen = method_named(method)
-    given = {} if file is None else _checked(_read(file), chosen, method, f"{file}: ")
-    given |= _checked(_split(settings or (), chosen, method), chosen, method, "--set: ")
+    owner = f"method {method}"
+    given = {} if file is None else _checked(_read(file), chosen.parameters, owner, f"{file}: ")
+    given |= changed_settings(settings, chosen.parameters, owner)
     try:
         return chosen.parameters(**given)
     except (ValueError, OverflowError) as error:  # the latter for whole numbers beyond any float
@@ -45,6 +43,24 @@ def effective_parameters(method: str, file: Path | None, settings: Sequence[str]
         problem = str(error)
         problem = problem if len(problem) <= 200 else problem[:197] + "..."  # it may quote the value
         raise ParametersError(f"settings of method {method}: {problem}") from error
+
+
+def changed_settings(settings: Sequence[str] | None, kind: type[Any], owner: str) -> dict[str, object]:
+    """Return what ``key=value`` texts change of a dataclass of settings.
+
+    Parameters
+    ----------
+    settings
+        The texts.
+    kind, owner
+        The dataclass, and whose settings these are, for messages.
+
+    Raises
+    ------
+    ParametersError
+        A text is not of this form, a key is unknown, or a value of the wrong kind.
+    """
+    return _checked(_split(settings or (), kind, owner), kind, owner, "--set: ")
 
 
 def parameters_as_yaml(method: str, parameters: Any, version: str) -> str:
@@ -55,14 +71,14 @@ def parameters_as_yaml(method: str, parameters: Any, version: str) -> str:
     return f"# Settings of method {method}, mapmeld {version}; read by --params\n{settings}"
 
 
-def _split(settings: Sequence[str], chosen: Method, method: str) -> dict[str, str]:
+def _split(settings: Sequence[str], kind: type[Any], owner: str) -> dict[str, str]:
     given: dict[str, str] = {}
     for setting in settings:
         key, equals, value = setting.partition("=")
         if not (key.strip() and equals):
-            defaults = ", ".join(f"{key}={value}" for key, value in asdict(chosen.parameters()).items())
+            defaults = ", ".join(f"{key}={value}" for key, value in asdict(kind()).items())
             raise ParametersError(
-                f"--set needs KEY=VALUE, not {short(setting)}; method {method} has, by default, {defaults}"
+                f"--set needs KEY=VALUE, not {short(setting)}; {owner} has, by default, {defaults}"
             )
         given[key.strip()] = value.strip()
     return given
@@ -77,15 +93,15 @@ def _read(file: Path) -> dict[str, str]:
     return {key: value.value for key, value in found.items() if isinstance(value, Scalar)}
 
 
-def _checked(given: Mapping[str, str], chosen: Method, method: str, source: str) -> dict[str, object]:
-    known = get_type_hints(chosen.parameters)
-    names = [field.name for field in fields(chosen.parameters)]
+def _checked(given: Mapping[str, str], kind: type[Any], owner: str, source: str) -> dict[str, object]:
+    known = get_type_hints(kind)
+    names = [field.name for field in fields(kind)]
     values: dict[str, object] = {}
     for key, value in given.items():
         if key not in names:
             near = difflib.get_close_matches(key[:100], names, n=3, cutoff=0.5)
             hint = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(names)}"
-            raise ParametersError(f"{source}method {method} has no setting {short(key)}; {hint}")
+            raise ParametersError(f"{source}{owner} has no setting {short(key)}; {hint}")
         try:
             values[key] = _converted(value, known[key])
         except ValueError as error:

@@ -84,8 +84,8 @@ def given_transform(text: str, a: str, b: str) -> Pose2:
     return transform_of_numbers(text)
 
 
-def transform_of_numbers(text: str) -> Pose2:
-    """Return the transform that "x,y,degrees" says."""
+def transform_of_numbers(text: str, option: str = "--transform", what: str = " or a .json file") -> Pose2:
+    """Return the transform that "x,y,degrees" says; `what` else the option takes."""
     from mapmeld.se2 import Pose2
 
     try:
@@ -94,7 +94,7 @@ def transform_of_numbers(text: str) -> Pose2:
             raise ValueError
     except ValueError:
         raise typer.BadParameter(
-            f"three numbers x,y,degrees or a .json file are needed, not {text!r}", param_hint="--transform"
+            f"three numbers x,y,degrees{what} are needed, not {text!r}", param_hint=option
         ) from None
     return Pose2(x, y, math.radians(degrees))
 

@@ -4,6 +4,7 @@ The steps of a benchmark: `read_dataset`, `plan_trials`, `run_trials`, `summarie
 `mapmeld.evaluation.store` and drawn by `mapmeld.evaluation.plots` (extra `benchmark`).
 """
 
+from mapmeld.evaluation.navigability import Navigability, NavigabilityError, Reach, Way, navigability, reach
 from mapmeld.evaluation.pairs import Dataset, DatasetError, Kind, Pair, read_dataset
 from mapmeld.evaluation.plan import PlanError, Trial, plan_trials
 from mapmeld.evaluation.rows import TrialRow
@@ -16,19 +17,25 @@ __all__ = [
     "Dataset",
     "DatasetError",
     "Kind",
+    "Navigability",
+    "NavigabilityError",
     "Pair",
     "PlanError",
     "PoseErrors",
+    "Reach",
     "Summary",
     "Tolerance",
     "Trial",
     "TrialRow",
+    "Way",
     "WorkerDiedError",
     "accuracy",
     "markdown_table",
+    "navigability",
     "overlap_centroid",
     "plan_trials",
     "pose_errors",
+    "reach",
     "read_dataset",
     "rich_table",
     "run_trials",

@@ -13,6 +13,7 @@ from mapmeld.grid import overlap_share
 from mapmeld.history.step import Change, Finding, Maps, Standing, Work
 from mapmeld.history.transforms import moved, same_place
 from mapmeld.matching import MatchResult, Verdict, match, method_named
+from mapmeld.se2 import Pose2
 
 
 class Algorithm1:
@@ -28,17 +29,29 @@ class Algorithm1:
 
     def __init__(self, method: str, parameters: Any) -> None:
         self.best: MatchResult | None = None
+        self._found = Verdict.REJECTED  # the verdict of the states on which `best` was found
+        self._accepted: Pose2 | None = None  # the last one that was, though it be withdrawn
         self._method = method
         self._parameters = parameters
 
     def update(self, maps: Maps, previous: Maps | None) -> Finding:
         """Take delta_1 and delta_2, at least one of them new. No earlier map is needed."""
         del previous
-        before = self.best
-        Lambda = self._on_new_maps(before, maps)
+        was_accepted = self.best is not None and self.best.verdict is Verdict.ACCEPTED
+        Lambda = self._on_new_maps(self.best, maps)
         current = match(*maps, self._method, self._parameters)
         self.best = more_similar(Lambda, current)
-        return _finding(before, Lambda, self.best, maps)
+        if self.best is current:
+            self._found = current.verdict
+        accepted = self.best.verdict is Verdict.ACCEPTED
+        standing = Standing.ACCEPTED if accepted else Standing.UNDECIDED
+        change = self._change(was_accepted, self.best, maps)
+        if accepted:
+            self._accepted = self.best.T_a_b
+        why = _why(Lambda, self.best, maps)
+        if was_accepted and not accepted:
+            why += ", but not accepted"
+        return Finding(self.best, standing, change, why, Work.SEARCH)
 
     def _on_new_maps(self, best: MatchResult | None, maps: Maps) -> MatchResult | None:
         """Re-score the best matching points of the previous iteration (Abstract)."""
@@ -50,8 +63,17 @@ class Algorithm1:
             best,
             similarity=similarity,
             overlap=overlap_share(*maps, best.T_a_b),
-            verdict=best.verdict if enough else Verdict.REJECTED,
+            verdict=self._found if enough else Verdict.REJECTED,
         )
+
+    def _change(self, was_accepted: bool, best: MatchResult, maps: Maps) -> Change:
+        if best.verdict is not Verdict.ACCEPTED or best.T_a_b is None:
+            return Change.WITHDRAWN if was_accepted else Change.NONE
+        if self._accepted is None:
+            return Change.FOUND
+        if not same_place(self._accepted, best.T_a_b, maps):
+            return Change.SWITCHED
+        return Change.CONFIRMED if was_accepted else Change.FOUND
 
 
 def more_similar(previous: MatchResult | None, current: MatchResult) -> MatchResult:
@@ -61,27 +83,14 @@ def more_similar(previous: MatchResult | None, current: MatchResult) -> MatchRes
     return previous
 
 
-def _finding(
-    before: MatchResult | None, previous: MatchResult | None, best: MatchResult, maps: Maps
-) -> Finding:
-    """Say in words what became of the best matching: as it was, on the new maps, and now."""
-    accepted = best.verdict is Verdict.ACCEPTED
-    standing = Standing.ACCEPTED if accepted else Standing.UNDECIDED
+def _why(previous: MatchResult | None, best: MatchResult, maps: Maps) -> str:
+    """Say in words how the best matching compares with the best so far, as that is on the new maps."""
     if best.T_a_b is None:
-        return Finding(best, standing, Change.NONE, best.reason, Work.SEARCH)
+        return best.reason
     similarity = f"similarity {best.similarity:.3f}"
     if previous is None or previous.T_a_b is None:
-        change, why = Change.FOUND, f"{similarity}: the first matching"
-    elif best is previous:
-        change, why = (
-            Change.CONFIRMED,
-            f"{similarity} on the new maps: higher than that of their own matching",
-        )
-    else:
-        rises = f"{similarity}: higher than the {previous.similarity:.3f} of the best so far on the new maps"
-        same = same_place(previous.T_a_b, best.T_a_b, maps)
-        change = Change.CONFIRMED if same else Change.SWITCHED
-        why = f"{rises}; {moved(previous.T_a_b, best.T_a_b, maps)}"
-    if before is not None and before.verdict is Verdict.ACCEPTED and not accepted:
-        change, why = Change.WITHDRAWN, f"{why}, but not accepted"
-    return Finding(best, standing, change, why, Work.SEARCH)
+        return f"{similarity}: the first matching"
+    if best is previous:
+        return f"{similarity} on the new maps: higher than that of their own matching"
+    rises = f"{similarity}: higher than the {previous.similarity:.3f} of the best so far on the new maps"
+    return f"{rises}; {moved(previous.T_a_b, best.T_a_b, maps)}"

@@ -17,12 +17,11 @@ from mapmeld.grid import OccupancyGrid
 from mapmeld.history.changes import changed_area
 from mapmeld.history.step import Change, Finding, Maps, Standing, Work
 from mapmeld.history.transforms import moved, same_place
-from mapmeld.matching import MatchResult, Verdict, match
+from mapmeld.matching import DEFAULT_METHOD, Alternative, MatchResult, Verdict, match
 from mapmeld.matching.correlative import CorrelativeParameters
 from mapmeld.matching.correlative.assess import assess
+from mapmeld.matching.correlative.matcher import LOOKED_AT
 from mapmeld.se2 import Pose2
-
-PROPOSALS = 4  # of a method's answer and its alternatives are weighed; the default method lists no more
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +44,7 @@ class EvidenceParameters:
     undecided_change
         while none is, so much.
     remember_probability
-        Other transforms at least this probable are weighed again at the next state.
+        Transforms at least this probable are weighed again beside what a new search finds.
     """
 
     keep_probability: float = 0.5
@@ -70,7 +69,8 @@ class EvidenceOverTime:
     """What the states so far come to; holds transforms and probabilities, no maps.
 
     Whatever method finds the transforms, the evidence of the walls weighs them
-    (`mapmeld.matching.correlative.assess`), so that every method's match has a probability.
+    (`mapmeld.matching.correlative.assess`), with those of the default method beside them, so that every
+    method's match has a probability.
     """
 
     def __init__(self, method: str, parameters: Any, evidence: EvidenceParameters | None = None) -> None:
@@ -122,11 +122,20 @@ class EvidenceOverTime:
         return self._search(maps), Work.SEARCH
 
     def _known(self) -> list[Pose2]:
-        """Return the transforms to weigh again: the best, and others that may be right instead."""
-        if self._best is None or self._best.T_a_b is None:
+        """Return the transforms to weigh again: the best, and its rivals.
+
+        However unlikely they are, what they reach tells what chance reaches with these maps.
+        """
+        return [] if self._best is None else _modes_of(self._best)[:LOOKED_AT]
+
+    def _worth_keeping(self) -> list[Pose2]:
+        """Return those of them that a new search need not find again."""
+        best = self._best
+        if best is None or best.T_a_b is None:
             return []
-        others = self._best.alternatives
-        return [self._best.T_a_b, *(other.T_a_b for other in others if self._worth(other.probability))]
+        if self._standing is not Standing.ACCEPTED and not self._worth(best.probability):
+            return []
+        return [best.T_a_b, *(o.T_a_b for o in best.alternatives if self._worth(o.probability))]
 
     def _worth(self, probability: float | None) -> bool:
         return (probability or 0.0) >= self._evidence.remember_probability
@@ -148,16 +157,21 @@ class EvidenceOverTime:
         return (seen.probability or 0.0) < self._evidence.keep_probability
 
     def _search(self, maps: Maps) -> MatchResult:
-        """Match afresh, and weigh together what that finds and what was known."""
+        """Match afresh, and weigh together what that finds and what was known.
+
+        A method that does not say how probable its answer is knows too few rivals, so those that the
+        default method finds are weighed with it.
+        """
         self._searched, self._changed = (maps[0].known_area, maps[1].known_area), (0.0, 0.0)
         fresh = match(*maps, self._method, self._parameters)
-        found = [] if fresh.T_a_b is None else [fresh.T_a_b, *(o.T_a_b for o in fresh.alternatives)]
-        found = found[:PROPOSALS]
-        hopeless = self._standing is not Standing.ACCEPTED and not (
-            self._best and self._worth(self._best.probability)
-        )
-        kept = [] if hopeless else self._known()
-        missed = [T for T in kept if not any(same_place(T, other, maps) for other in found)]
+        found = _modes_of(fresh)[:LOOKED_AT]
+        others = self._worth_keeping()
+        if fresh.probability is None:
+            others += _modes_of(match(*maps, DEFAULT_METHOD, self._judge))
+        missed: list[Pose2] = []
+        for T in others:
+            if not any(same_place(T, other, maps) for other in (*found, *missed)):
+                missed.append(T)
         if fresh.probability is not None and not missed:
             return fresh
         return assess(*maps, [*found, *missed], self._judge) if found or missed else fresh
@@ -230,7 +244,15 @@ class EvidenceOverTime:
         assert newest.T_a_b is not None
         if same_place(self._accepted, newest.T_a_b, maps):
             return newest
-        return replace(assess(*maps, [self._accepted], self._judge), probability=probability)
+        alone = assess(*maps, [self._accepted], self._judge)
+        rival = Alternative(newest.T_a_b, newest.similarity, newest.probability)
+        others = (o for o in newest.alternatives if not same_place(self._accepted, o.T_a_b, maps))
+        return replace(alone, probability=probability, alternatives=(rival, *others))
+
+
+def _modes_of(result: MatchResult) -> list[Pose2]:
+    """Return the transforms of an answer, the best first."""
+    return [] if result.T_a_b is None else [result.T_a_b, *(other.T_a_b for other in result.alternatives)]
 
 
 def _probability_of(T: Pose2 | None, newest: MatchResult, maps: Maps) -> float:

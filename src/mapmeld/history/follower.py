@@ -153,8 +153,9 @@ def follow(
     ----------
     process_1, process_2
         The states of each process in time order, or the path of a history folder. Where states have
-        stamps the earlier comes first, otherwise the processes take turns; either may end first. The
-        frame of a process must stay the same, all else (size, origin, the map itself) may change.
+        stamps the earlier comes first, of the same moment those of process 1; otherwise the processes
+        take turns; either may end first. The frame of a process must stay the same, all else (size,
+        origin, the map itself) may change.
     method, parameters
         As for `mapmeld.match`.
     strategy

@@ -29,9 +29,8 @@ class Change(StrEnum):
     """What a new state did to the match.
 
     NONE: nothing. FOUND: accepted, for the first time or again. CONFIRMED: it was accepted and stays.
-    LOWERED: it stays, but the newest maps speak less for it. SWITCHED: another transform took its
-    place. WITHDRAWN: it is accepted no more. (Of strategy ``paper``, which accepts nothing: FOUND is the
-    first matching, CONFIRMED and SWITCHED are said of the best one.)
+    LOWERED: it stays, but the newest maps speak less for it (never said by strategy ``paper``).
+    SWITCHED: another transform took its place. WITHDRAWN: it is accepted no more.
     """
 
     NONE = "none"

@@ -8,6 +8,7 @@ import secrets
 import stat
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 from mapmeld.io import AnyPath, MapFileError
 
@@ -77,6 +78,39 @@ def write_files(files: Sequence[tuple[AnyPath, Chunks]], *, force: bool = False)
         for leftover in [*temporary, *placed]:
             with contextlib.suppress(OSError):
                 leftover.unlink()
+
+
+@contextlib.contextmanager
+def whole_file(path: AnyPath, *, force: bool = False) -> Iterator[BinaryIO]:
+    """Give a temporary file beside `path` to write to, that takes its name when the block ends well.
+
+    For what is too large, or takes too long, to hold in memory; else as `write_files`. With an exception
+    in the block nothing is left behind.
+
+    Raises
+    ------
+    MapFileError
+        As `check_targets`, or the disk refuses.
+    """
+    check_targets([path], force=force)
+    target = Path(os.path.realpath(path)) if force else Path(path)
+    temp = target.with_name(f".mapmeld-{secrets.token_hex(8)}.tmp")
+    try:
+        with _explained(target):
+            file = temp.open("xb")
+        with file:
+            yield file
+            with _explained(target):
+                file.flush()
+                os.fsync(file.fileno())
+        with _explained(target):
+            if force:
+                temp.replace(target)
+            else:
+                _place(temp, target)
+    finally:
+        with contextlib.suppress(OSError):
+            temp.unlink()
 
 
 def _write(path: Path, chunks: Chunks) -> None:

@@ -12,7 +12,6 @@ There a state may be named without its ending too, or by its number alone. Where
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Iterator, Sequence
@@ -27,6 +26,7 @@ from mapmeld.io.map_server import read_map
 
 MAP_ENDINGS = (".yaml", ".yml")
 _SECONDS = re.compile(r"\d+(\.\d+)?")
+_GREATEST = 9e9  # [s] either way; from then on, the year 2255, stamps are a mistake, and no sums can be made
 _LONGEST_TIMES = 10_000_000  # bytes; a day of states a second is 2 MB
 
 
@@ -104,7 +104,10 @@ def _times_in_names(folder: Path, maps: Sequence[Path]) -> list[tuple[float, Pat
                 "its name is no time; name states by their seconds (12.5.yaml), or list them in a "
                 f"{TIMES} beside them: 'NAME.yaml SECONDS' on each line",
             )
-        timed.append((float(path.stem), path))
+        seconds = _number(path.stem)
+        if seconds is None:
+            raise MapFileError.of(folder / path.name, f"its name is no time: more than {_GREATEST:,.0f} s")
+        timed.append((seconds, path))
     return timed
 
 
@@ -131,7 +134,11 @@ def _times_listed(folder: Path, maps: Sequence[Path]) -> list[tuple[float, Path]
             continue
         seconds = _number(words[-1])
         if len(words) != 2 or seconds is None:
-            raise MapFileError.of(listing, f"line {number}: 'NAME.yaml SECONDS' is needed, not {line[:80]!r}")
+            raise MapFileError.of(
+                listing,
+                f"line {number}: 'NAME.yaml SECONDS' is needed, not {line[:80]!r}"
+                f"; no time is beyond {_GREATEST:,.0f}",
+            )
         name = words[0].strip()
         path = by_name.get(name)
         if path is None and re.fullmatch(r"[0-9]{1,18}", name):
@@ -151,4 +158,4 @@ def _number(text: str) -> float | None:
         value = float(text)
     except ValueError:
         return None
-    return value if math.isfinite(value) else None
+    return value if abs(value) <= _GREATEST else None

@@ -19,6 +19,10 @@ TIMES = "times.txt"
 _OURS = re.compile(r"state_\d{5,}\.(yaml|pgm)|times\.txt")
 
 
+class NoStatesError(MapFileError):
+    """A history without a state."""
+
+
 def write_history(
     states: Iterable[OccupancyGrid], folder: AnyPath, *, force: bool = False
 ) -> tuple[Path, ...]:
@@ -47,14 +51,15 @@ def write_history(
 
     Raises
     ------
+    NoStatesError
+        There is no state.
     MapFileError
-        There is no state, or one without a stamp.
+        One has no stamp.
     FolderError
         The folder is not empty (and `force` is not set) or cannot be written.
     """
     target = Path(folder)
-    earlier = [name for name in _names_in(target) if _OURS.fullmatch(name)]
-    with whole_folder(target, force=force, ours=earlier) as temporary:
+    with whole_folder(target, force=force, ours=history_files(target)) as temporary:
         lines = ["# map  stamp [s]"]
         frame = None
         for number, grid in enumerate(states):
@@ -69,7 +74,7 @@ def write_history(
             lines.append(f"{name} {float(grid.stamp)!r}")
         names = [line.partition(" ")[0] for line in lines if not line.startswith("#")]
         if not names:
-            raise MapFileError.of(folder, "there is no map to write")
+            raise NoStatesError.of(folder, "there is no map to write")
         write_files([(temporary / TIMES, ["\n".join([*lines, ""]).encode()])])
     return tuple(target / name for name in names)
 
@@ -79,8 +84,9 @@ def state_name(number: int) -> str:
     return f"state_{number:05}.yaml"
 
 
-def _names_in(folder: Path) -> list[str]:
+def history_files(folder: AnyPath) -> list[str]:
+    """Return the names of the files in a folder that are called as those of a history are."""
     try:
-        return os.listdir(folder)  # noqa: PTH208  (names, not paths)
+        return [name for name in os.listdir(folder) if _OURS.fullmatch(name)]  # noqa: PTH208  (names)
     except OSError:  # none yet; what else may be wrong is said when it is written
         return []

@@ -39,6 +39,7 @@ TRINARY_OCCUPIED_THRESH, TRINARY_FREE_THRESH = 0.65, 0.196
 
 # What chooses the greys, by default: the defaults of nav2's map_saver.
 OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.25
+OLD_FREE_THRESH = FREE_THRESH  # in the files that nav2 wrote before
 
 _PIXELS_AT_ONCE = 1 << 20
 

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from mapmeld.errors import MapmeldError
 from mapmeld.extras import required
-from mapmeld.parallel.jobs import RESTARTS, Job, Shared, WorkerDiedError
+from mapmeld.parallel.job import RESTARTS, Job, Shared, WorkerDiedError
 
 R = TypeVar("R")
 

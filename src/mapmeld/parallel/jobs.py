@@ -4,29 +4,11 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
-from mapmeld.errors import MapmeldError
+from mapmeld.parallel.job import Job, filled
 
 R = TypeVar("R")
-
-Job = tuple[Any, ...]
-"""The arguments of one call. A `Shared` among them stands for an object that is sent ahead."""
-
-RESTARTS = 2
-"""How often what a lost worker had not finished is given to others."""
-
-
-class WorkerDiedError(MapmeldError):
-    """Workers ended unexpectedly, again and again."""
-
-
-@dataclass(frozen=True, slots=True)
-class Shared:
-    """Stands, in a job, for the object of that number among those that every worker is sent once."""
-
-    number: int
 
 
 def run_jobs(
@@ -99,8 +81,3 @@ def _run_here(
         prepare()
     for number, job in enumerate(jobs):
         yield number, function(*filled(job, shared))
-
-
-def filled(job: Job, shared: Sequence[object]) -> Job:
-    """Return the job with the shared objects in their places."""
-    return tuple(shared[part.number] if isinstance(part, Shared) else part for part in job)

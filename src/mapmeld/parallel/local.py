@@ -12,7 +12,7 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
-from mapmeld.parallel.jobs import RESTARTS, Job, WorkerDiedError, filled
+from mapmeld.parallel.job import RESTARTS, Job, WorkerDiedError, filled
 
 R = TypeVar("R")
 
@@ -70,7 +70,8 @@ def _submitted(
     pool: ProcessPoolExecutor, function: Callable[..., R], waiting: dict[int, Job]
 ) -> dict[Future[R], int]:
     futures: dict[Future[R], int] = {}
-    with _one_thread_each(), contextlib.suppress(BrokenProcessPool):
+    # It is here that workers are started.
+    with _one_thread_each(), _not_to_be_interrupted(), contextlib.suppress(BrokenProcessPool):
         for number, job in waiting.items():
             futures[pool.submit(_call, function, job)] = number
     return futures
@@ -94,9 +95,26 @@ def _one_thread_each() -> Iterator[None]:
                 os.environ[name] = value
 
 
+@contextlib.contextmanager
+def _not_to_be_interrupted() -> Iterator[None]:
+    """Hold Ctrl-C back from this thread, and from the processes that it starts, which inherit that.
+
+    It reaches the whole group of processes. A worker that has not come to `_start_worker` yet would
+    say, with a traceback, that it was interrupted.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # not POSIX
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)  # what was held back comes now
+
+
 def _start_worker(shared: Sequence[object], prepare: Callable[[], Any] | None) -> None:
     global _shared
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; the parent ends the workers
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends the workers
     threading.Thread(target=_end_with_parent, daemon=True).start()
     _shared = shared
     if prepare:

@@ -30,7 +30,7 @@ _PALETTE: tuple[Colour, ...] = (
     BLUE,
     RED,
 )
-_UNSEEN, _FLOOR, _EXPLORED, _NEAR_VANISHED, _NEAR_APPEARED = 1, 2, 3, 4, 5
+_UNKNOWN, _UNSEEN, _FLOOR, _EXPLORED, _NEAR_VANISHED, _NEAR_APPEARED = 0, 1, 2, 3, 4, 5
 _WALL_UNSEEN, _WALL_EXPLORED, _WALL, _VANISHED, _APPEARED = 6, 7, 8, 9, 10
 
 
@@ -81,6 +81,7 @@ def changes(diff: MapDiff, caption: str = "") -> Picture:
             (_EXPLORED, "floor newly explored"),
             (_WALL_UNSEEN, "obstacle not seen again"),
             (_UNSEEN, "floor not seen again"),
+            (_UNKNOWN, "unknown"),
         )
     ]
     return compose(

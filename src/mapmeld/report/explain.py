@@ -20,7 +20,7 @@ from mapmeld.matching.alphabet import (
     thicken_walls,
     thin_walls,
 )
-from mapmeld.matching.alphabet.preprocessing import BLACK, WHITE, Image
+from mapmeld.matching.drawn_walls import BLACK, WHITE, Image
 from mapmeld.merging import merge_aligned
 from mapmeld.report.canvas import (
     GREYS,

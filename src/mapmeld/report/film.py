@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from mapmeld.grid import Cells, OccupancyGrid, resample
+from mapmeld.grid import Cells, OccupancyGrid, at_resolution, resample
 from mapmeld.history.step import Change, Step, Work
 from mapmeld.io.atomic import check_targets, write_files
+from mapmeld.matching.per_map import PerMap
 from mapmeld.merging.aligned import lattice_for_all
 from mapmeld.report.canvas import Picture, Window, paint, whole_scale
 from mapmeld.report.overlay import overlay_labels
@@ -28,15 +29,18 @@ TURNS = STRIP_FRAMES - 2  # beside the first and the last
 FRAME_MS, LAST_MS = 300, 2500
 _NO_DITHER = 3  # there are few colours, none of which shall be mixed from others
 _STRIP_PX, _GIF_PX = 320, 400  # long side of a panel that is aimed at
+_MOST_CELLS = 2 * _GIF_PX  # along a side, of a map that is kept and of what is drawn; finer is not shown
+_MOST_SHRUNK = 20  # times; pictures of more would show dots, far apart
 _NARROWEST = 200  # [px] of a panel: room for the longest word below it
 _TURNING = (Change.FOUND, Change.SWITCHED, Change.WITHDRAWN)
 _LEGEND = [(RED, "walls of map 1"), (BLUE, "walls of map 2"), (GREEN, "walls in both")]
 
 
 class Film:
-    """Steps to draw, in order; of many it keeps some, evenly spread, so that memory stays bounded.
+    """Steps to draw, in order; of many it keeps some, evenly spread, with maps no finer than is drawn.
 
-    Where a match was found, switched or withdrawn is kept besides: the first such step and the newest ones.
+    So memory stays bounded, however many states there are and however large they grow. Where a match was
+    found, switched or withdrawn is kept besides: the first such step and the newest ones.
 
     Attributes
     ----------
@@ -58,6 +62,7 @@ class Film:
         as_it_was = self._last is not None and step.work is Work.NOTHING
         if None in step.maps or as_it_was:
             return
+        step = _kept_small(step)
         self._last = step
         if step.change in _TURNING:
             self._turns.append(step)
@@ -90,6 +95,21 @@ class Film:
         return [chosen[number] for number in sorted(chosen)]
 
 
+def _kept_small(step: Step) -> Step:
+    first, second = _both(step)
+    return replace(step, maps=(_small(first), _small(second)))
+
+
+def _small(grid: OccupancyGrid) -> OccupancyGrid:
+    return grid if max(grid.shape) <= _MOST_CELLS else _shrunk(grid)
+
+
+@PerMap
+def _shrunk(grid: OccupancyGrid) -> OccupancyGrid:
+    known = grid.cropped()
+    return at_resolution(known, known.resolution * max(1.0, max(known.shape) / _MOST_CELLS))
+
+
 def _apart(one: Step, other: Step) -> float:
     """Return how far apart two steps are: in time, or in states where there are no times."""
     if one.stamp is None or other.stamp is None:
@@ -103,7 +123,7 @@ def strip(film: Film) -> Picture:
     Raises
     ------
     PictureError
-        There was never a map of both.
+        There was never a map of both, or maps lie too far apart for one picture.
     """
     scenes = _scenes(film.moments(), film.begin, _STRIP_PX)
     caption = "Above: the frame of map 1; map 2 lies in it while the match is accepted. Below: map 2 alone."
@@ -116,7 +136,7 @@ def frames(film: Film) -> list[Picture]:
     Raises
     ------
     PictureError
-        There was never a map of both.
+        There was never a map of both, or maps lie too far apart for one picture.
     """
     pictures = [
         compose(
@@ -161,15 +181,26 @@ def write_gif(pictures: Sequence[Picture], path: str | os.PathLike[str], *, forc
         As `check_gif_path`, or the disk refuses.
     """
     check_gif_path(path, force=force)
+    write_files([(path, (gif_bytes(pictures),))], force=force)
+    return Path(path)
+
+
+def gif_bytes(pictures: Sequence[Picture]) -> bytes:
+    """Return the content of a GIF file.
+
+    Raises
+    ------
+    PictureError
+        OpenCV fails.
+    """
     animation = cv2.Animation()
     animation.frames = list(pictures)
     animation.durations = [*([FRAME_MS] * (len(pictures) - 1)), LAST_MS]
     settings = [cv2.IMWRITE_GIF_DITHER, _NO_DITHER]
     done, data = cv2.imencodeanimation(".gif", animation, settings)
     if not done:
-        raise PictureError(f"{os.fspath(path)}: OpenCV could not encode the animation")
-    write_files([(path, (np.asarray(data, dtype=np.uint8).tobytes(),))], force=force)
-    return Path(path)
+        raise PictureError("OpenCV could not encode the animation")
+    return np.asarray(data, dtype=np.uint8).tobytes()
 
 
 # ---------------------------------------------------------------------- one step drawn
@@ -212,8 +243,30 @@ def _layers(scenes: Sequence[Sequence[tuple[OccupancyGrid, Pose2 | None]]]) -> l
     """Return the cells of all that is placed in each scene, all on one lattice."""
     placed = [[(grid, T) for grid, T in scene if T is not None] for scene in scenes]
     everything = [item for scene in placed for item in scene]
+    resolution = _drawn_resolution(everything)
+    coarse = [[(_no_finer(grid, resolution), T) for grid, T in scene] for scene in placed]
+    everything = [item for scene in coarse for item in scene]
     lattice = lattice_for_all([grid for grid, _ in everything], [T for _, T in everything])
-    return [[resample(grid, T, lattice) for grid, T in scene] for scene in placed]
+    return [[resample(grid, T, lattice) for grid, T in scene] for scene in coarse]
+
+
+def _drawn_resolution(placed: Sequence[tuple[OccupancyGrid, Pose2]]) -> float:
+    """Return the side of a cell [m]: that of the first map, or larger, so that a picture holds them all."""
+    first = placed[0][0]
+    reached = []
+    for grid, T in placed:
+        rows, cols = grid.shape
+        corners = grid.lattice_to_metres([(0, 0), (cols, 0), (0, rows), (cols, rows)])
+        reached.append(first.metres_to_lattice(T.apply(corners)))
+    corners = np.concatenate(reached)
+    times = max(1.0, float(np.ptp(corners, axis=0).max()) / _MOST_CELLS)
+    if times > _MOST_SHRUNK:
+        raise PictureError("the maps lie too far apart, over all states, for one picture")
+    return first.resolution * times
+
+
+def _no_finer(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:
+    return grid if grid.resolution >= resolution else at_resolution(grid, resolution)
 
 
 def _window(scenes: Sequence[Sequence[Cells]]) -> Window:

@@ -41,8 +41,19 @@ def write_picture(picture: Picture, path: str | os.PathLike[str], *, force: bool
         As `check_picture_path`, or the disk refuses.
     """
     check_picture_path(path, force=force)
+    write_files([(path, (png_bytes(picture),))], force=force)
+    return Path(path)
+
+
+def png_bytes(picture: Picture) -> bytes:
+    """Return the content of a PNG file.
+
+    Raises
+    ------
+    PictureError
+        OpenCV fails.
+    """
     done, data = cv2.imencode(".png", picture)
     if not done:
-        raise PictureError(f"{os.fspath(path)}: OpenCV could not encode the picture")
-    write_files([(path, (np.asarray(data, dtype=np.uint8).tobytes(),))], force=force)
-    return Path(path)
+        raise PictureError("OpenCV could not encode the picture")
+    return np.asarray(data, dtype=np.uint8).tobytes()

@@ -6,6 +6,7 @@ import os
 import random
 import shutil
 import sqlite3
+import tempfile
 from collections.abc import Iterator
 from contextlib import closing
 from importlib import import_module
@@ -14,12 +15,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import zstandard
 from bag_files import FORMATS, Sent, mcap_bytes, sent_map, sent_text, story, write_mcap, write_rosbag1
 
 from mapmeld.errors import MapmeldError
 from mapmeld.grid import OccupancyGrid
-from mapmeld.io.recordings import RecordingError, map_states, recording_info
+from mapmeld.io.recordings import RecordingError, folder_scan, map_states, recording_info
 from mapmeld.io.recordings.source import reason_of
+from mapmeld.io.recordings.unpacking import MAX_PIECE_BYTES, unpacked
 
 TOPIC = "/robot_1/map"
 
@@ -134,6 +137,17 @@ def test_of_a_recording_cut_in_the_middle_the_first_half_can_be_used(name: str, 
     assert info.left_out
 
 
+def test_any_byte_of_a_summary_that_is_wrong_is_noticed(tmp_path: Path) -> None:
+    data = mcap_bytes(story())
+    path = tmp_path / "run.mcap"
+    begin = int.from_bytes(data[-28:-20], "little")  # of the footer: where the summary begins
+    assert 0 < begin < len(data) - 200
+    for at in range(begin, len(data) - 29, 5):
+        path.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
+        with pytest.raises(RecordingError):
+            map_states(path, TOPIC)
+
+
 def test_packed_as_a_whole_and_cut_off(tmp_path: Path) -> None:
     path = FORMATS["rosbag2-mcap-file"](tmp_path, growing(1000))
     whole = list(map_states(path, TOPIC))
@@ -143,6 +157,36 @@ def test_packed_as_a_whole_and_cut_off(tmp_path: Path) -> None:
     found = list(map_states(path, TOPIC, damaged="use"))
     assert is_part_of(found, whole)
     assert 0.3 * len(whole) <= len(found) < len(whole)
+
+
+def test_packed_files_that_unpack_to_too_much(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = FORMATS["rosbag2-mcap-file"](tmp_path, growing(1000))
+    (packed,) = path.glob("*.zstd")
+    whole = list(map_states(path, TOPIC, damaged="use"))
+    size = len(zstandard.ZstdDecompressor().stream_reader(packed.read_bytes()).read())
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    monkeypatch.setattr(folder_scan, "MAX_FILE_BYTES", size)
+    assert list(map_states(path, TOPIC, damaged="use")) == whole
+    monkeypatch.setattr(folder_scan, "MAX_FILE_BYTES", size - 1)
+    with pytest.raises(RecordingError, match=f"unpacks to more than {size - 1:,} bytes") as refused:
+        map_states(path, TOPIC, damaged="use")
+    assert str(packed) in str(refused.value)
+    # Of others in the folder, the maps are used.
+    (path / "other.mcap").write_bytes(mcap_bytes(growing()))
+    states = map_states(path, TOPIC, damaged="use")
+    assert list(states) == list(map_states(path / "other.mcap", TOPIC))
+    assert any("unpacks to more than" in reason for reason in states.left_out)
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_disk_that_is_nearly_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = FORMATS["rosbag2-mcap-file"](tmp_path, growing(1000))
+    full = shutil.disk_usage(tmp_path)._replace(free=2000)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
+    with pytest.raises(RecordingError, match="unpacks to more than 1,000 bytes"):
+        map_states(path, TOPIC, damaged="use")
 
 
 def test_mcap_that_was_not_finished(tmp_path: Path) -> None:
@@ -294,6 +338,12 @@ def _chunks(compression: str, data: bytes, declared: int) -> Iterator[bytes]:
     ).write(builder)
     yield begin
     yield builder.end()  # type: ignore[no-untyped-call]
+
+
+@pytest.mark.parametrize("compression", ["", "bz2", "lz4", "zstd"])
+def test_a_piece_that_says_it_is_larger_than_any_is_not_unpacked(compression: str) -> None:
+    with pytest.raises(ValueError, match="more than the"):
+        unpacked(b"", compression, MAX_PIECE_BYTES + 1)
 
 
 @pytest.mark.parametrize("declared", [1000, 10**8, 10**10, 2**63])

@@ -88,17 +88,17 @@ def test_recordings_in_several_files_are_read_in_their_order(tmp_path: Path) -> 
     assert same_states(list(states), EXPECTED)
 
 
-def test_messages_of_other_topics_are_never_decoded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_of_other_topics_are_neverdecoded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from mapmeld.io.recordings import messages
 
     seen: list[str] = []
-    decode = messages._decoded
+    decode = messages.decoded
 
     def noting(data: bytes, kind: str, encoding: str) -> Any:
         seen.append(kind)
         return decode(data, kind, encoding)
 
-    monkeypatch.setattr(messages, "_decoded", noting)
+    monkeypatch.setattr(messages, "decoded", noting)
     list(map_states(write_mcap(tmp_path, story()), "/robot_2/map"))
     assert seen == ["nav_msgs/msg/OccupancyGrid"] * 2
 

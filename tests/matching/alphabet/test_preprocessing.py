@@ -3,7 +3,7 @@ from drawing import drawn, office
 
 from mapmeld.grid import OccupancyGrid
 from mapmeld.matching.alphabet import binarise, blur_clutter, preprocess, thicken_walls, thin_walls
-from mapmeld.matching.alphabet.preprocessing import Image
+from mapmeld.matching.drawn_walls import Image
 
 
 def picture(image: Image) -> str:

@@ -2,10 +2,13 @@ import math
 
 import pytest
 from drawing import cut, office, row_of_rooms, school, seen_from
+from hypothesis import given
+from hypothesis import strategies as st
 
-from mapmeld.grid import OccupancyGrid, ResolutionError
+from mapmeld.grid import OccupancyGrid, ResolutionError, overlap_share
 from mapmeld.matching import Verdict, match
 from mapmeld.matching.correlative import CorrelativeParameters
+from mapmeld.matching.correlative import assess as assess_module
 from mapmeld.matching.correlative import search as search_module
 from mapmeld.matching.correlative.assess import assess, similarity_at
 from mapmeld.se2 import Pose2
@@ -72,6 +75,51 @@ def test_rivals_share_the_probability() -> None:
     assert alone.probability is not None
     assert rivals.probability is not None
     assert rivals.probability < 0.6 * alone.probability
+
+
+@pytest.mark.parametrize(
+    ("a", "b"),
+    [
+        (office(), seen_from(office(), T_B_A)),
+        (cut(office(), 0, 0, 10, 12), cut(office(), 6, 0, 16, 12)),
+        (cut(school(), 0, 0, 12, 9), cut(office(), 0, 0, 8, 12)),
+        (row_of_rooms(6), cut(row_of_rooms(6), 4, 0, 12.1, 5)),
+    ],
+    ids=["all", "overlapping", "different", "repeating"],
+)
+def test_with_all_rivals_it_is_what_the_matcher_says(a: OccupancyGrid, b: OccupancyGrid) -> None:
+    found = match(a, b)
+    assert found.T_a_b is not None
+    assert found.probability is not None
+    again = assess(a, b, [found.T_a_b, *(other.T_a_b for other in found.alternatives)])
+    assert again.probability == pytest.approx(found.probability, abs=0.02)
+    alone = assess(a, b, [found.T_a_b])
+    assert alone.probability is not None
+    if (found.alternatives[0].probability or 0.0) < 0.1:  # missing rivals count as usual ones
+        assert alone.probability < found.probability + 0.3
+
+
+@given(
+    st.floats(-40, 40), st.floats(-40, 40), st.floats(-4, 4), st.sampled_from([(0, 0, 3, 2), (8, 3, 16, 12)])
+)
+def test_transforms_that_lay_the_maps_side_by_side_are_dropped(
+    x: float, y: float, theta: float, part: tuple[float, float, float, float]
+) -> None:
+    a, b, T = office(), cut(office(), *part), Pose2(x, y, theta)
+    weighed = assess(a, b, [T])
+    if overlap_share(a, b, T) > 0:
+        assert weighed.T_a_b is not None
+    if weighed.T_a_b is None:
+        assert "do not meet" in weighed.reason
+        assert similarity_at(a, b, T, CorrelativeParameters()) == 0.0
+
+
+@pytest.mark.parametrize("way", [Pose2(30, 0, 0), Pose2(-30, 0, 0), Pose2(0, 30, 0), Pose2(0, -30, 0)])
+def test_nothing_is_weighed_where_the_maps_do_not_meet(way: Pose2, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(assess_module, "weigh", None)
+    monkeypatch.setattr(assess_module, "refine", None)
+    assert assess(office(), school(), [way]).T_a_b is None
+    assert similarity_at(office(), school(), way, CorrelativeParameters()) == 0.0
 
 
 def test_both_maps_play_the_same_part(maps: tuple[OccupancyGrid, OccupancyGrid]) -> None:

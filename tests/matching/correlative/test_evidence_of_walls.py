@@ -38,7 +38,6 @@ def test_a_map_explains_itself() -> None:
     assert e.contra == e.contra_bent == 0
     assert e.bend == pytest.approx(0, abs=1e-3)
     assert e.overlap == pytest.approx(1, abs=0.01)
-    assert e.overlap_area == pytest.approx(80, rel=0.01)
     assert e.shares == pytest.approx((1, 0), abs=0.02)
     np.testing.assert_allclose(e.unbent, 0, atol=1e-3)
     assert e.surplus > 10
@@ -83,12 +82,11 @@ def test_what_the_other_map_does_not_know_is_not_tested() -> None:
 
 def test_the_overlap_is_the_area_known_in_both() -> None:
     e = weighed(room(), room(), Pose2(5, 0, 0))
-    assert e.overlap_area == pytest.approx(40, rel=0.03)
     assert e.overlap == pytest.approx(0.5, abs=0.02)
     small = walls_of(cut(built(10, 8, around(10, 8)), 0, 0, 10, 4))
     assert weighed(room(), small).overlap == pytest.approx(1, abs=0.01)
     nothing = weighed(room(), room(), Pose2(50, 0, 0))
-    assert nothing.overlap_area == nothing.overlap == 0
+    assert nothing.overlap == 0
     assert nothing.hit == 0
     assert nothing.surplus == pytest.approx(0, abs=1e-3)
 
@@ -145,7 +143,7 @@ def test_many_transforms_are_weighed_as_one_by_one() -> None:
 
 
 # ---------------------------------------------------------------------- figures
-PERFECT = Evidence(100, 100, 100, 0, 0, 0.1, 0.6, 0, 50, 1.0, 30, np.zeros(3))
+PERFECT = Evidence(100, 100, 100, 0, 0, 0.1, 0.6, 0, 1.0, 30, np.zeros(3))
 
 
 def test_surplus_is_the_deviance_from_chance() -> None:

@@ -102,6 +102,20 @@ def test_maps_of_all_resolutions_are_found(resolution_a: float, resolution_b: fl
     assert_found(mapmeld.match(a, b), T_a_b, max(0.02, 0.4 * coarser), max(0.1, 2 * coarser))
 
 
+@pytest.mark.parametrize(("resolution", "thickness"), [(0.05, 0.3), (0.1, 0.1), (0.1, 0.2)])
+def test_thick_walls_are_aligned_as_finely_as_thin_ones(resolution: float, thickness: float) -> None:
+    side = round(thickness / FINE.resolution)
+    wall = cv2.dilate(FINE.occupied.astype(np.uint8), np.ones((side, side), np.uint8)) > 0
+    place = OccupancyGrid(np.where(wall, np.int8(OCCUPIED), FINE.cells), FINE.resolution)
+    T_a = Pose2(0.31, 0.17, -0.2)
+    a, b = seen_from(place, T_a, resolution), seen_from(place, B_T, resolution)
+    T_a_b = mapmeld.match(a, b).T_a_b
+    assert T_a_b is not None
+    off, turned = error(T_a.inverse() @ T_a_b, B_T.inverse())
+    assert off < 0.01
+    assert turned < 0.1
+
+
 def salted(grid: OccupancyGrid, share: float, seed: int) -> OccupancyGrid:
     cells = grid.cells.copy()
     cells[grid.known & (np.random.default_rng(seed).random(grid.shape) < share)] = OCCUPIED
@@ -324,3 +338,10 @@ def test_one_hypothesis_has_no_alternatives() -> None:
     result = match_correlative(A, seen_from(A, B_T), CorrelativeParameters(hypotheses=1))
     assert_found(result, B_T.inverse())
     assert result.alternatives == ()
+
+
+def test_where_the_walls_do_not_meet_nothing_is_said_of_shares() -> None:
+    bare = OccupancyGrid(cells_with(UNKNOWN, (0, 0), (59, 59)), 0.05)
+    result = mapmeld.match(bare, bare)
+    assert "of 0 m" not in result.reason
+    assert "next to no wall" in result.reason or "nothing to match on" in result.reason

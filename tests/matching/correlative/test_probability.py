@@ -49,7 +49,7 @@ def test_one_mode_is_a_logistic() -> None:
 
 
 def test_scores_are_weighted_figures() -> None:
-    e = Evidence(100, 90, 95, 2, 1, 0.1, 0.6, 0.05, 40, 0.5, 20, np.zeros(3))
+    e = Evidence(100, 90, 95, 2, 1, 0.1, 0.6, 0.05, 0.5, 20, np.zeros(3))
     model = ProbabilityModel(-3.0, {"surplus": 0.5, "clean": 2.0})
     assert model.score(e) == pytest.approx(-3 + 0.5 * e.surplus + 2 * e.clean)
     assert ProbabilityModel(-3.0, {}).score(e) == -3
@@ -73,7 +73,7 @@ def test_what_is_shipped_trusts_plenty_of_wall_and_not_a_little() -> None:
     def p(wall: float, explained: float, against: float) -> float:
         e = Evidence(
             wall, explained * wall, explained * wall, against * wall, against * wall,
-            0.1, 0.6, 0.02, wall / 2, 0.7, wall / 4, np.zeros(3),
+            0.1, 0.6, 0.02, 0.7, wall / 4, np.zeros(3),
         )  # fmt: skip
         model = fitted_model()
         return float(mode_probabilities([Mode(np.zeros(3), e, model.score(e))], model)[0])
@@ -88,7 +88,7 @@ def test_what_is_shipped_trusts_plenty_of_wall_and_not_a_little() -> None:
 def test_what_others_reach_is_taken_off() -> None:
     def e(share: float) -> Evidence:
         return Evidence(
-            100, 100 * share, 100 * share, 0, 0, 0.1, 0.6, 0.02, 50, 0.7, 25, np.zeros(3)
+            100, 100 * share, 100 * share, 0, 0, 0.1, 0.6, 0.02, 0.7, 25, np.zeros(3)
         )  # fmt: skip
 
     modes = [e(0.9), e(0.5), e(0.3)]

@@ -40,12 +40,24 @@ def test_points_lie_on_the_middle_line_of_a_wall(
     assert z.real.max() <= 110 * resolution
 
 
-@pytest.mark.xfail(strict=True, reason="a wall of more than 0.1 m is a blob to a window of 3 x 3 field cells")
-@pytest.mark.parametrize(("resolution", "thickness"), [(0.05, 4), (0.1, 2)])
-def test_thick_walls_are_walls(resolution: float, thickness: int) -> None:
+@pytest.mark.parametrize(("resolution", "thickness"), [(0.05, 4), (0.1, 2), (0.02, 10)])
+def test_thick_walls_are_walls_and_have_a_middle(resolution: float, thickness: int) -> None:
     cells = np.full((50, 120), FREE, np.int8)
     cells[20 : 20 + thickness] = OCCUPIED
-    assert np.median(walls_of(OccupancyGrid(cells, resolution)).straight) > 0.3
+    walls = walls_of(OccupancyGrid(cells, resolution))
+    inside = (walls.points.real > 0.4) & (walls.points.real < 120 * resolution - 0.4)
+    assert walls.straight[inside].min() > 0.3
+    np.testing.assert_allclose(walls.points.imag[inside], (20 + thickness / 2) * resolution, atol=1e-5)
+    np.testing.assert_allclose(walls.metres[inside].sum(), 120 * resolution - 0.8, rtol=0.15)
+
+
+def test_a_solid_block_is_no_wall() -> None:
+    cells = np.full((60, 60), FREE, np.int8)
+    cells[20:40, 20:40] = OCCUPIED
+    walls = walls_of(OccupancyGrid(cells, 0.1))
+    deep = (np.abs(walls.points.real - 3) < 0.6) & (np.abs(walls.points.imag - 3) < 0.6)
+    assert deep.any()
+    assert walls.straight[deep].max() <= 0.3
 
 
 @pytest.mark.parametrize("degrees", [7, 30, 45, 80])

@@ -18,6 +18,9 @@ from mapmeld.io.recordings.messages import EXTRA, RecordingError
 from mapmeld.io.recordings.source import Channel, Message, Source
 from mapmeld.io.recordings.sqlite_scan import sqlite_scan
 
+MAX_FILE_BYTES = 1 << 33
+"""Largest file that is unpacked into a temporary folder, if that has twice the room."""
+
 PACKED = ".zstd"
 """What files have added to their names that rosbag2 compressed as a whole."""
 
@@ -52,9 +55,11 @@ def folder_scan(path: str) -> Iterator[Source]:
         sources: list[Source] = []
         failed: list[RecordingError] = []
         for file in storage_files(path):
-            plain = _unpacked(file, stack) if file.suffix == PACKED else str(file)
-            opened = mcap_source(plain, strict=False) if plain.endswith(".mcap") else sqlite_scan(plain)
+            plain = str(file)
             try:
+                if file.suffix == PACKED:
+                    plain = _unpacked(file, stack)
+                opened = mcap_source(plain, strict=False) if plain.endswith(".mcap") else sqlite_scan(plain)
                 sources.append(stack.enter_context(opened))
             except MapFileError as error:
                 failed.append(RecordingError(str(error).replace(plain, str(file))))
@@ -69,12 +74,26 @@ def folder_scan(path: str) -> Iterator[Source]:
 
 
 def _unpacked(file: Path, stack: ExitStack) -> str:
-    """Unpack a file as far as that goes; return where it is until the stack closes."""
-    plain = Path(stack.enter_context(TemporaryDirectory()), file.stem)
+    """Unpack a file as far as that goes; return where it is until the stack closes.
+
+    Raises
+    ------
+    RecordingError
+        It becomes too large.
+    """
+    folder = stack.enter_context(TemporaryDirectory())
+    plain = Path(folder, file.stem)
+    most = min(MAX_FILE_BYTES, shutil.disk_usage(folder).free // 2)
+    size = 0
     with open_regular(file, may_be_empty=True) as (packed, _), plain.open("wb") as out:
         reader = required("zstandard", EXTRA).ZstdDecompressor().stream_reader(packed)
         with suppress(Exception):  # what is missing will show when the file is read
-            shutil.copyfileobj(reader, out)
+            while size <= most and (piece := reader.read(1 << 20)):
+                size += len(piece)
+                out.write(piece)
+    if size > most:
+        plain.unlink()
+        raise RecordingError.of(file, f"unpacks to more than {most:,} bytes; unpack it yourself (unzstd)")
     return str(plain)
 
 

@@ -72,6 +72,8 @@ def _indexed(path: str, file: BinaryIO, size: int) -> Source | None:
     )
     reader.get_header()
     summary = reader.get_summary()
+    if summary:
+        _check_summary(file, size)
     statistics = summary and summary.statistics
     if not statistics or statistics.channel_count != len(summary.channels):
         return None
@@ -81,7 +83,6 @@ def _indexed(path: str, file: BinaryIO, size: int) -> Source | None:
         return None
     if any(index.uncompressed_size > MAX_PIECE_BYTES for index in indexes):
         raise ValueError(f"chunks of more than {MAX_PIECE_BYTES:,} bytes")
-    _check_summary(file, size)
     return _IndexedSource(path, reader, summary)
 
 

@@ -26,8 +26,12 @@ CDR, ROS1 = "cdr", "ros1"
 ENCODINGS = (CDR, ROS1)
 """The ways of writing messages that are read: those of ROS 2 and of ROS 1."""
 
-# The type stores of rosbags lack it; the same in ROS 1 and ROS 2.
+# What the type stores of rosbags lack, one or both; the same in ROS 1 and ROS 2.
 _UPDATE_DEFINITION = "std_msgs/Header header\nint32 x\nint32 y\nuint32 width\nuint32 height\nint8[] data\n"
+
+
+_FRAMES_DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
+TF = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
 class RecordingError(MapFileError):
@@ -78,7 +82,7 @@ def grid_of(data: bytes, encoding: str, received: int) -> OccupancyGrid | None:
     BadMessageError
         It cannot be decoded, or it is no map.
     """
-    message = _decoded(data, GRID, encoding)
+    message = decoded(data, GRID, encoding)
     info = message.info
     rows, cols = int(info.height), int(info.width)
     cells = _cells_of(message.data, rows, cols)
@@ -95,15 +99,15 @@ def grid_of(data: bytes, encoding: str, received: int) -> OccupancyGrid | None:
     if problem is not None:
         raise BadMessageError(f"a map whose {problem}")
     return OccupancyGrid(
-        cells, resolution, origin, _stamp_of(message.header, received), str(message.header.frame_id)
+        cells, resolution, origin, stamp_of(message.header, received), str(message.header.frame_id)
     )
 
 
 def patch_of(data: bytes, encoding: str, received: int) -> Patch:
     """Return the patch in an OccupancyGridUpdate message; parameters and errors as of `grid_of`."""
-    message = _decoded(data, UPDATE, encoding)
+    message = decoded(data, UPDATE, encoding)
     cells = _cells_of(message.data, int(message.height), int(message.width))
-    return Patch(int(message.y), int(message.x), cells, _stamp_of(message.header, received))
+    return Patch(int(message.y), int(message.x), cells, stamp_of(message.header, received))
 
 
 def patched(grid: OccupancyGrid, patch: Patch) -> OccupancyGrid | None:
@@ -143,7 +147,8 @@ def _yaw_of(turn: Any) -> float:
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-def _stamp_of(header: Any, received: int) -> float:
+def stamp_of(header: Any, received: int) -> float:
+    """Return the stamp of a header [s]; where that is zero, when the message was received [ns]."""
     nanoseconds = int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec)
     return seconds(nanoseconds or received)
 
@@ -154,23 +159,33 @@ def seconds(nanoseconds: int) -> float:
 
 
 # ---------------------------------------------------------------------- decoding
-def _decoded(data: bytes, kind: str, encoding: str) -> Any:
+def decoded(data: bytes, kind: str, encoding: str, what: str = "map") -> Any:
+    """Return a message of one of the types that ROS brings along, as the library rosbags has it.
+
+    Raises
+    ------
+    BadMessageError
+        It cannot be decoded; the message names `what` it should have been.
+    """
     store = _store(encoding)
     decode = store.deserialize_cdr if encoding == CDR else store.deserialize_ros1
     try:
         return decode(data, kind)
     except Exception as error:  # whatever the library trips over: the bytes are to blame
-        raise BadMessageError("bytes that are no map") from error
+        raise BadMessageError(f"bytes that are no {what}") from error
 
 
 @cache
 def _store(encoding: str) -> Any:
-    """Return what knows the two types; their definitions in the recording are not looked at.
+    """Return what knows the types that are read; their definitions in the recording are not looked at.
 
-    They have never changed, and a recording's other types shall not get in the way.
+    They have hardly ever changed, and a recording's other types shall not get in the way.
     """
     typesys = required("rosbags.typesys", EXTRA)
     stores = typesys.Stores
     store = typesys.get_typestore(stores.ROS1_NOETIC if encoding == ROS1 else stores.ROS2_HUMBLE)
     store.register(typesys.get_types_from_msg(_UPDATE_DEFINITION, UPDATE))
+    for name in TF:
+        if name not in store.types:
+            store.register(typesys.get_types_from_msg(_FRAMES_DEFINITION, name))
     return store

@@ -4,7 +4,7 @@ preprocess -> corners -> alphabet -> compare -> candidates -> best; `algorithm2`
 that runs them.
 """
 
-from mapmeld.matching.alphabet.algorithm2 import MapMatching, in_metres, map_matching, match_alphabet
+from mapmeld.matching.alphabet.algorithm2 import MapMatching, map_matching, match_alphabet
 from mapmeld.matching.alphabet.candidates import Candidate, select_candidates
 from mapmeld.matching.alphabet.comparison import compare_alphabets
 from mapmeld.matching.alphabet.corners import extract_corners
@@ -12,18 +12,17 @@ from mapmeld.matching.alphabet.fitting import (
     Fitting,
     align,
     best_matching_points,
-    black_pixels,
-    jaccard_similarity,
 )
 from mapmeld.matching.alphabet.letters import Alphabet, generate_alphabet, greatest_distance
 from mapmeld.matching.alphabet.parameters import AlphabetParameters
 from mapmeld.matching.alphabet.preprocessing import (
-    binarise,
     blur_clutter,
     preprocess,
     thicken_walls,
     thin_walls,
 )
+from mapmeld.matching.drawn_walls import binarise, black_pixels, jaccard_similarity
+from mapmeld.matching.lattices import in_metres
 
 __all__ = [
     "Alphabet",

@@ -18,10 +18,11 @@ from mapmeld.matching.alphabet.corners import extract_corners
 from mapmeld.matching.alphabet.fitting import Fitting, best_matching_points
 from mapmeld.matching.alphabet.letters import Alphabet, generate_alphabet, greatest_distance
 from mapmeld.matching.alphabet.parameters import AlphabetParameters
-from mapmeld.matching.alphabet.preprocessing import Image, preprocess
+from mapmeld.matching.alphabet.preprocessing import preprocess
+from mapmeld.matching.drawn_walls import Image
+from mapmeld.matching.lattices import in_metres
 from mapmeld.matching.modes import distinct_modes
 from mapmeld.matching.result import Alternative, MatchResult, Verdict
-from mapmeld.se2 import Pose2
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,15 +62,6 @@ def map_matching(a: OccupancyGrid, b: OccupancyGrid, parameters: AlphabetParamet
     fittings = best_matching_points(phi, alpha_1, alpha_2, beta_1, beta_2)
 
     return MapMatching((map_1, map_2), (alpha_1, alpha_2), (letters_1, letters_2), gamma, phi, fittings)
-
-
-def in_metres(T_1_2_px: Pose2, map_1: OccupancyGrid, map_2: OccupancyGrid) -> Pose2:
-    """Take a transform between the lattices [px] to the metric frames of the maps (T_a_b).
-
-    Both maps must have the same resolution.
-    """
-    step = Pose2(T_1_2_px.x * map_1.resolution, T_1_2_px.y * map_1.resolution, T_1_2_px.theta)
-    return map_1.origin @ step @ map_2.origin.inverse()
 
 
 def match_alphabet(

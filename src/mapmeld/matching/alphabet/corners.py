@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmeld.matching.alphabet.parameters import AlphabetParameters
-from mapmeld.matching.alphabet.preprocessing import Image
+from mapmeld.matching.drawn_walls import Image
 
 Points = NDArray[np.float64]
 

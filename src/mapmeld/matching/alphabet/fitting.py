@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-import cv2
-import numpy as np
-
 from mapmeld.matching.alphabet.candidates import Candidate
 from mapmeld.matching.alphabet.corners import Points
-from mapmeld.matching.alphabet.preprocessing import BLACK, Image
+from mapmeld.matching.drawn_walls import Image, black_pixels, jaccard_similarity
 from mapmeld.se2 import Pose2, rigid_through
 
 
@@ -41,31 +37,6 @@ def align(candidate: Candidate, corners_1_px: Points, corners_2_px: Points) -> P
     """
     (i, z), (j, k) = candidate.first, candidate.second
     return rigid_through(corners_2_px[z], corners_2_px[k], corners_1_px[i], corners_1_px[j])
-
-
-def black_pixels(image: Image) -> Points:
-    """Return the centres (col, row) + 0.5 of an image's black pixels, shape (n, 2) [px]."""
-    rows, cols = np.divmod(np.flatnonzero(image == BLACK), max(image.shape[1], 1))
-    return np.stack([cols, rows]).T + 0.5
-
-
-def jaccard_similarity(image_1: Image, black_2_px: Points, T_1_2_px: Pose2) -> float:
-    """Return the black pixels that both maps share / the black pixels of either (Jaccard 1912).
-
-    Each black pixel of map 2 is carried to the pixel of map 1 in which its centre falls. This counts
-    what a rotation of the whole image would, to about 0.01, at the cost of the walls only.
-    Pixels that fall outside map 1 belong to the union.
-    """
-    x, y = black_2_px.T
-    c, s = math.cos(T_1_2_px.theta), math.sin(T_1_2_px.theta)
-    height, width = image_1.shape
-    col, row = c * x - s * y + T_1_2_px.x, s * x + c * y + T_1_2_px.y
-    inside = (col >= 0) & (col < width) & (row >= 0) & (row < height)
-    pixel = row[inside].astype(np.intp) * width + col[inside].astype(np.intp)
-    black_1 = image_1.size - cv2.countNonZero(image_1) if image_1.size else 0
-    shared = min(int(np.count_nonzero(image_1.ravel()[pixel] == BLACK)), black_1)
-    union = black_1 + len(black_2_px) - shared
-    return shared / union if union else 0.0
 
 
 def best_matching_points(

@@ -9,20 +9,11 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from mapmeld.grid import OccupancyGrid
-
-Image = NDArray[np.uint8]
-
-BLACK, WHITE = 0, 255
+from mapmeld.matching.drawn_walls import Image, binarise
 
 _SQUARE = np.ones((3, 3), np.uint8)
-
-
-def binarise(grid: OccupancyGrid) -> Image:
-    """Return black obstacles on white; what is unknown becomes white (Figure 1b)."""
-    return np.where(grid.occupied, np.uint8(BLACK), np.uint8(WHITE))
 
 
 def thicken_walls(image: Image, times: int) -> Image:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from mapmeld.grid import OccupancyGrid, at_resolution
-from mapmeld.matching.alphabet.fitting import black_pixels, jaccard_similarity
 from mapmeld.matching.alphabet.parameters import AlphabetParameters
 from mapmeld.matching.alphabet.preprocessing import preprocess
+from mapmeld.matching.drawn_walls import black_pixels, jaccard_similarity
+from mapmeld.matching.lattices import in_pixels
 from mapmeld.se2 import Pose2
 
 
@@ -19,9 +20,3 @@ def similarity_at(a: OccupancyGrid, b: OccupancyGrid, T_a_b: Pose2, parameters: 
     map_1, map_2 = at_resolution(a, coarser), at_resolution(b, coarser)
     alpha_1, alpha_2 = (preprocess(grid, parameters.median_px) for grid in (map_1, map_2))
     return jaccard_similarity(alpha_1, black_pixels(alpha_2), in_pixels(T_a_b, map_1, map_2))
-
-
-def in_pixels(T_a_b: Pose2, map_1: OccupancyGrid, map_2: OccupancyGrid) -> Pose2:
-    """Take a transform between metric frames to one between the lattices [px]; undoes `in_metres`."""
-    step = map_1.origin.inverse() @ T_a_b @ map_2.origin
-    return Pose2(step.x / map_1.resolution, step.y / map_1.resolution, step.theta)

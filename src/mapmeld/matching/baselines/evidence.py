@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmeld.grid import FREE_UP_TO, OCCUPIED_FROM, OccupancyGrid, at_resolution, overlap_share
-from mapmeld.matching.alphabet.algorithm2 import in_metres
-from mapmeld.matching.alphabet.fitting import black_pixels, jaccard_similarity
-from mapmeld.matching.alphabet.preprocessing import Image, binarise
-from mapmeld.matching.alphabet.rescoring import in_pixels
+from mapmeld.matching.drawn_walls import Image, binarise, black_pixels, jaccard_similarity
+from mapmeld.matching.lattices import in_metres, in_pixels
 from mapmeld.matching.result import MatchResult, Verdict
 from mapmeld.se2 import Pose2
 

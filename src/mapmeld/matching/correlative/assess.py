@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mapmeld.grid import OccupancyGrid, check_resolutions
 from mapmeld.matching.correlative.alignment import refine, to_local
@@ -24,6 +25,7 @@ from mapmeld.matching.correlative.matcher import (
 from mapmeld.matching.correlative.parameters import CorrelativeParameters
 from mapmeld.matching.correlative.prepared_map import PreparedMap, prepare
 from mapmeld.matching.correlative.probability import fitted_model
+from mapmeld.matching.correlative.wall_map import BORDER, Doubles, WallMap
 from mapmeld.matching.result import MatchResult
 from mapmeld.se2 import Pose2
 
@@ -46,7 +48,7 @@ def assess(
         The maps.
     transforms
         T_a_b, each within about 0.3 m and a few degrees of where the walls want it. Those that align
-        to the same place count once.
+        to the same place count once, those that lay the maps side by side do not count.
     parameters
         As for the method; only `accept_probability` matters here.
 
@@ -73,6 +75,9 @@ def _assess(
 ) -> MatchResult:
     model = fitted_model()
     local = np.array([to_local(a.walls, b.walls, T) for T in transforms])
+    local = local[_meet(a.walls, b.walls, local)]
+    if not len(local):
+        return _rejected("the maps do not meet where they are laid")
     local = refine(a.walls, b.walls, local, FINE_SCALES, FINE_POINTS)
     modes = _distinct(b.walls, _weighed(a.walls, b.walls, local, model))
     probabilities = mode_probabilities(modes, model)
@@ -89,5 +94,24 @@ def similarity_at(
     if _comes_first(prepared_b.walls, prepared_a.walls):
         prepared_a, prepared_b, T_a_b = prepared_b, prepared_a, T_a_b.inverse()
     walls_a, walls_b = prepared_a.walls, prepared_b.walls
-    (evidence,) = weigh(walls_a, walls_b, to_local(walls_a, walls_b, T_a_b)[None])
+    local = to_local(walls_a, walls_b, T_a_b)[None]
+    if not _meet(walls_a, walls_b, local).all():
+        return 0.0
+    (evidence,) = weigh(walls_a, walls_b, local)
     return _similarity(walls_a, walls_b, evidence)
+
+
+def _meet(walls_a: WallMap, walls_b: WallMap, t: Doubles) -> NDArray[np.bool_]:
+    """Whether the known rectangles of both maps meet, axis by axis of a, under each t (k, 3).
+
+    Evidence is gathered in patches all over what the maps cover together, kilometres if they are that
+    far apart, as after a mapping that began anew in another frame.
+    """
+    (height_a, width_a), (height_b, width_b) = (
+        [(cells - 2 * BORDER) * walls.cell for cells in walls.shape] for walls in (walls_a, walls_b)
+    )
+    corners = np.array([0, width_b, 1j * height_b, width_b + 1j * height_b])
+    laid = np.exp(1j * t[:, 2:]) * corners + t[:, :1] + 1j * t[:, 1:2]
+    x, y = laid.real, laid.imag
+    across = (x.max(axis=1) >= 0) & (x.min(axis=1) <= width_a)
+    return np.asarray(across & (y.max(axis=1) >= 0) & (y.min(axis=1) <= height_a))

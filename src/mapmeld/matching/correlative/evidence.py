@@ -35,8 +35,8 @@ class Evidence:
         random would get.
     bend
         Rms displacement by the bending [m].
-    overlap_area, overlap
-        Area known in both [m^2], and its share of the smaller map.
+    overlap
+        Area known in both / known area of the smaller map.
     weak
         Explained wall that fixes the least fixed direction [m]; small along corridors.
     unbent
@@ -51,7 +51,6 @@ class Evidence:
     chance: float
     chance_deep: float
     bend: float
-    overlap_area: float
     overlap: float
     weak: float
     unbent: Doubles
@@ -134,7 +133,6 @@ def weigh(pa: WallMap, pb: WallMap, t: Doubles, n: int = 1200) -> list[Evidence]
         close.tolist(),
         deep.tolist(),
         np.sqrt((explained * _squared(u)).sum(axis=1) / hit_bent).tolist(),
-        area.tolist(),
         (area / min(pa.area, pb.area)).tolist(),
         np.maximum(0, (xx + yy) / 2 - np.hypot((xx - yy) / 2, xy)).tolist(),
         nearest_rigid(t, rigid.x, u, explained),

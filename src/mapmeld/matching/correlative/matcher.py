@@ -13,7 +13,7 @@ import numpy as np
 
 from mapmeld.grid import OccupancyGrid
 from mapmeld.matching.correlative.alignment import refine, to_local, to_metric, turn_and_shift
-from mapmeld.matching.correlative.covariance import of_inverse, transform_covariance
+from mapmeld.matching.correlative.covariance import best_fit, of_inverse
 from mapmeld.matching.correlative.evidence import HIT, Evidence, quick_scores, weigh
 from mapmeld.matching.correlative.parameters import CorrelativeParameters
 from mapmeld.matching.correlative.prepared_map import PreparedMap, prepare
@@ -221,29 +221,27 @@ def _answer(
     walls_a: WallMap, walls_b: WallMap, modes: Sequence[Mode], probabilities: Doubles, accept: float
 ) -> MatchResult:
     best = modes[0].evidence
-    reason = (
-        f"of {best.wall:.0f} m of wall in the overlap the other map explains "
-        f"{100 * best.hit_bent / best.wall:.0f} % and contradicts {100 * best.contra / best.wall:.1f} %"
-    )
+    reason = _in_words(best)
     if probabilities[0] >= accept:
         verdict = Verdict.ACCEPTED
     elif best.weak < FIXED_LEAST and _enough(best) / (1 + math.exp(-modes[0].score)) > 0.5:
         verdict = Verdict.AMBIGUOUS
-        reason += f"; only {best.weak:.1f} m of it fix the place along the others"
+        reason += f"; only {best.weak:.1f} m of wall fix the place along the others"
     elif probabilities.sum() >= accept:
         verdict = Verdict.AMBIGUOUS
         reason += "; another transform explains the maps about as well"
     else:
         verdict = Verdict.REJECTED
         reason += ": not enough to be sure"
+    fitted, covariance = best_fit(walls_a, walls_b, best.unbent, best.overlap)
     return MatchResult(
-        T_a_b=to_metric(walls_a, walls_b, modes[0].local),
+        T_a_b=to_metric(walls_a, walls_b, fitted),
         verdict=verdict,
         reason=reason,
         probability=float(probabilities[0]),
         similarity=_similarity(walls_a, walls_b, best),
         overlap=min(1.0, best.overlap),
-        covariance=transform_covariance(walls_a, walls_b, modes[0].local, best.bend),
+        covariance=covariance,
         alternatives=tuple(
             Alternative(
                 to_metric(walls_a, walls_b, mode.local),
@@ -252,6 +250,15 @@ def _answer(
             )
             for mode, probability in zip(modes[1:], probabilities[1:], strict=True)
         ),
+    )
+
+
+def _in_words(found: Evidence) -> str:
+    if found.wall < 1:
+        return "next to no wall of either map lies where the other map knows anything"
+    return (
+        f"of {found.wall:.0f} m of wall in the overlap the other map explains "
+        f"{100 * found.hit_bent / found.wall:.0f} % and contradicts {100 * found.contra / found.wall:.1f} %"
     )
 
 

@@ -26,13 +26,20 @@ Cells = NDArray[np.int32]
 
 FIELD_CELL = 0.1  # [m] lattice on which the nearest wall is looked up; finer detail is in the wall points
 MAX_FIELD_CELLS = 6_000_000  # larger maps get coarser fields, so that time and memory stay bounded
-BORDER = 2  # unknown cells around a field, where points outside the map land
+BORDER = 3  # unknown cells around a field, where points outside the map land
 STRAIGHT_LEAST = 0.3  # of a line; below, a wall point has no direction
+THICK_LEAST = 0.5  # of a line in more than 3 x 3 field cells; below, its sides may be out of sight
 FLOOR_SAMPLE = 1000  # known cells that measure the overlap
 
-_WINDOW = [(dx, dy) for dy in range(-2, 3) for dx in range(-2, 3)]
-_INNER = [at for at in _WINDOW if max(map(abs, at)) < 2]  # 3 x 3 field cells around one
-_OUTER = [at for at in _WINDOW if max(map(abs, at)) == 2]  # the further ones of 5 x 5
+
+def _ring(r: int) -> list[tuple[int, int]]:
+    """(dx, dy) of the field cells r away from one, counted as a king walks."""
+    square = [(dx, dy) for dy in range(-r, r + 1) for dx in range(-r, r + 1)]
+    return [at for at in square if max(map(abs, at)) == r]
+
+
+_NEAR = [*_ring(0), *_ring(1)]
+_FURTHER = [_ring(2), _ring(3)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,8 +167,8 @@ def _wall_points(wall: Image, k: int, shape: tuple[int, int]) -> _WallPoints:
 
     A point is moved onto the wall's middle line, found from the first and second moments of the wall
     cells in the 3 x 3 field cells around it. This takes the raggedness of a cell out of the walls.
-    A thick wall looks like a blob to them; whether it is a line after all, 5 x 5 tell. Where a wall
-    takes up several field cells side by side, they share its length.
+    A thick wall looks like a blob to them; whether it is a line after all, 5 x 5 and then 7 x 7 tell. Where
+    a wall takes up several field cells side by side, they share its length.
     """
     width = shape[1]
     row, col = places(wall)
@@ -181,17 +188,22 @@ def _wall_points(wall: Image, k: int, shape: tuple[int, int]) -> _WallPoints:
     for column, weight in enumerate((None, x, y, x * x, x * y, y * y)):
         m[:, column] = np.bincount(i, weight, n + 1)
     m[:n, 6], m[n, 6] = 1, 0  # counts field cells
-    near = _sums(m, place, own, width, _INNER)
+    near = _sums(m, place, own, width, _NEAR)
     along, straight, middle, length = _lines(near)
-    line = np.where(straight > STRAIGHT_LEAST, along * 1j, 0)
     blob = np.flatnonzero(straight <= STRAIGHT_LEAST)
-    if len(blob):
-        wide = near[blob] + _sums(m, place, own[blob], width, _OUTER)
-        along_wide, straight_wide, _, length[blob] = _lines(wide)
-        line[blob] = np.where(straight_wide > STRAIGHT_LEAST, along_wide * 1j, 0)
+    wide = near[blob]
+    for ring in _FURTHER:
+        wide += _sums(m, place, own[blob], width, ring)
+        along_wide, straight_wide, middle_wide, length[blob] = _lines(wide)
+        thick = straight_wide > THICK_LEAST
+        of_wall = blob[thick]
+        along[of_wall], straight[of_wall] = along_wide[thick], straight_wide[thick]
+        middle[of_wall] = middle_wide[thick]
+        blob, wide = blob[~thick], wide[~thick]
     mine = (m[:n, 1] + 1j * m[:n, 2]) / m[:n, 0]
     on_line = middle + along * ((mine - middle) * along.conj()).real
     spot = np.where(straight > STRAIGHT_LEAST, on_line, mine) / (2 * k) - (1 + 1j) * BORDER
+    line = np.where(straight > STRAIGHT_LEAST, along * 1j, 0)
     return _WallPoints(own, np.asarray(spot), along * 1j, straight, line, length / (2 * k))
 
 
