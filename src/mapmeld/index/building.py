@@ -11,12 +11,15 @@ from pathlib import Path
 
 from mapmeld.errors import MapmeldError
 from mapmeld.index.entries import IndexedMap, MapIndex, MapIndexError, Stamp
-from mapmeld.index.signature import signature_of
+from mapmeld.index.ranking import Ranking
+from mapmeld.index.signature import Signature, signature_of
 from mapmeld.io.map_server import read_description, read_map
 from mapmeld.parallel import run_jobs
 
 SAVE_EVERY = 5.0
 """[s] between two calls of `on_progress`, by which what is done so far can be kept."""
+
+_Described = tuple[IndexedMap, Signature]
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,12 +103,12 @@ def build_index(
     WorkerDiedError
         Workers died again and again.
     """
-    before = {m.name: m for m in known.maps} if known else {}
-    done: dict[str, IndexedMap] = {}
+    before = {m.name: number for number, m in enumerate(known.maps)} if known else {}
+    done: dict[str, _Described] = {}
     for name in names:
-        old = before.get(name)
-        if old is not None and old.is_unchanged(root):
-            done[name] = old
+        number = before.get(name)
+        if known is not None and number is not None and known.maps[number].is_unchanged(root):
+            done[name] = known.maps[number], known.ranking.signature(number)
             if on_map:
                 on_map()
     kept = len(done)
@@ -116,10 +119,10 @@ def build_index(
     try:
         with contextlib.closing(running):
             for number, found in running:
-                if isinstance(found, IndexedMap):
-                    done[found.name] = found
-                else:
+                if isinstance(found, str):
                     skipped.append((waiting[number], found))
+                else:
+                    done[waiting[number]] = found
                 if on_map:
                     on_map()
                 if on_progress and time.monotonic() >= due:
@@ -133,12 +136,13 @@ def build_index(
     return Built(_index(root, done), len(done) - kept, kept, gone, tuple(sorted(skipped)))
 
 
-def _index(root: Path, done: dict[str, IndexedMap]) -> MapIndex:
-    return MapIndex(root, tuple(done[name] for name in sorted(done)))
+def _index(root: Path, done: dict[str, _Described]) -> MapIndex:
+    found = [done[name] for name in sorted(done)]
+    return MapIndex(root, tuple(m for m, _ in found), Ranking.of([signature for _, signature in found]))
 
 
-def _described(root: Path, name: str) -> IndexedMap | str:
-    """Return a map's entry, or what is wrong with it."""
+def _described(root: Path, name: str) -> _Described | str:
+    """Return a map's entry and signature, or what is wrong with it."""
     path = root / name
     try:
         # Stamps first: if a file changes while it is read, it will not have them and be read again.
@@ -155,4 +159,4 @@ def _described(root: Path, name: str) -> IndexedMap | str:
         name.encode()
     except UnicodeEncodeError:
         return f"{name!r}: its name is not Unicode"
-    return IndexedMap(name, os.path.relpath(image, path.parent), (stamp, image_stamp), signature)
+    return IndexedMap(name, os.path.relpath(image, path.parent), (stamp, image_stamp)), signature

@@ -1,4 +1,4 @@
-"""What an index holds: maps by their names in a folder, each with its signature."""
+"""What an index holds: maps by their names in a folder, and their signatures."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mapmeld.errors import MapmeldError
-from mapmeld.index.signature import Signature
+from mapmeld.index.ranking import Ranking
 from mapmeld.io import printable
 
 
@@ -49,14 +49,11 @@ class IndexedMap:
         The image that the YAML file named, as `os.path.join` takes it from the YAML file's folder.
     stamps
         Of the YAML file and of the image, when they were read.
-    signature
-        What the map looks like.
     """
 
     name: str
     image: str
     stamps: tuple[Stamp, Stamp]
-    signature: Signature
 
     def path(self, root: Path) -> Path:
         """Return where the map is under a folder of maps."""
@@ -79,7 +76,10 @@ class MapIndex:
         The folder.
     maps
         In the order of their names.
+    ranking
+        What they look like, in the same order.
     """
 
     root: Path
     maps: tuple[IndexedMap, ...]
+    ranking: Ranking

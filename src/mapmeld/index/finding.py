@@ -9,7 +9,6 @@ from pathlib import Path
 from mapmeld.errors import MapmeldError
 from mapmeld.grid import OccupancyGrid
 from mapmeld.index.entries import MapIndex
-from mapmeld.index.ranking import Ranking
 from mapmeld.index.signature import signature_of
 from mapmeld.io import load
 from mapmeld.matching import DEFAULT_METHOD, MatchResult, Verdict, match, method_named
@@ -57,7 +56,7 @@ def candidates_for(
     but
         The map's own file, which is left out if it is in the index.
     """
-    order, scores = Ranking([m.signature for m in index.maps]).best(signature_of(grid))
+    order, scores = index.ranking.best(signature_of(grid))
     own = None if but is None else but.resolve()
     found: list[Candidate] = []
     for number, score in zip(order, scores, strict=True):

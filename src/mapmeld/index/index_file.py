@@ -1,35 +1,35 @@
 """An index as one file.
 
-    line 1     ``mapmeld index 1``
-    line 2     JSON of one line: version of the signatures, folder of maps (relative to the file), and of each
-               map its name, image, two stamps and number of words; and a checksum of all that follows
-    the rest   words of all maps, uint16; their counts, uint16; little-endian
+    line 1     ``mapmeld index 2``
+    line 2     JSON of one line: version of the signatures, folder of maps (relative to the file), of each
+               map its name, image and two stamps; and a checksum of all that follows
+    the rest   lengths of the signatures, float32; owners of each word, uint32; weights, uint8, a row for
+               each word: all that a query needs is there, and nothing is made ready; little-endian
 
 Nothing in it is executed, and no size is believed that the file's own size does not bear out.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
+import zlib
 from collections.abc import Sequence
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mapmeld.index.entries import IndexedMap, MapIndex, MapIndexError, Stamp
-from mapmeld.index.signature import Signature, signature_version, vocabulary
+from mapmeld.index.ranking import Ranking
+from mapmeld.index.signature import signature_version, word_count
 from mapmeld.io import MapFileError
 from mapmeld.io.atomic import write_files
 from mapmeld.io.images import open_regular
 
-MAGIC = b"mapmeld index 1\n"
+MAGIC = b"mapmeld index 2\n"
 MAX_BYTES = 1 << 32
-"""Largest file that is read; a map takes about 2 KB."""
-
-_BYTES_A_WORD = 4
+"""Largest file that is read; a map takes about 6 KB."""
 
 
 def write_index(index: MapIndex, path: Path) -> None:
@@ -40,22 +40,17 @@ def write_index(index: MapIndex, path: Path) -> None:
     MapFileError
         The file cannot be written.
     """
-    words = np.concatenate([np.zeros(0, np.uint16), *(m.signature.words for m in index.maps)])
-    counts = np.concatenate([np.zeros(0, np.uint16), *(m.signature.counts for m in index.maps)])
-    rest = words.astype("<u2").tobytes() + counts.astype("<u2").tobytes()
+    ranking = index.ranking
+    arrays = (ranking.lengths.astype("<f4"), ranking.owners.astype("<u4"), ranking.weights)
+    rest = b"".join(array.tobytes() for array in arrays)
     head = {
         "signatures": signature_version(),
         "maps_in": Path(os.path.relpath(index.root.resolve(), path.resolve().parent)).as_posix(),
         "maps": [
-            [
-                m.name,
-                m.image,
-                *(number for s in m.stamps for number in (s.size, s.changed)),
-                len(m.signature.words),
-            ]
+            [m.name, m.image, *(number for s in m.stamps for number in (s.size, s.changed))]
             for m in index.maps
         ],
-        "checksum": hashlib.blake2b(rest, digest_size=16).hexdigest(),
+        "checksum": zlib.crc32(rest),
     }
     write_files([(path, [MAGIC, json.dumps(head).encode() + b"\n", rest])], force=True)
 
@@ -92,49 +87,45 @@ def read_index(path: Path) -> MapIndex:
         fields = json.loads(head)
         if fields["signatures"] != signature_version():
             raise MapIndexError.of(path, _OTHER_VERSION)
-        if fields["checksum"] != hashlib.blake2b(rest, digest_size=16).hexdigest():
+        if fields["checksum"] != zlib.crc32(rest):
             raise ValueError("its checksum is wrong")
-        maps = _maps(fields["maps"], rest)
+        maps = _maps(fields["maps"])
+        ranking = _ranking(len(maps), rest)
         root = Path(os.path.normpath(path.resolve().parent / _text(fields["maps_in"])))
     except (ValueError, TypeError, KeyError, IndexError, RecursionError, OverflowError) as error:
         what = f"it has no {error}" if isinstance(error, KeyError) else " ".join(str(error).split())[:150]
         raise MapIndexError.of(
             path, f"is damaged ({what}); make it again with 'mapmeld index --force'"
         ) from None
-    return MapIndex(root, maps)
+    return MapIndex(root, maps, ranking)
 
 
 _OTHER_VERSION = "was made by another version of mapmeld; make it again with 'mapmeld index --force'"
 
 
-def _maps(rows: Sequence[Any], rest: bytes) -> tuple[IndexedMap, ...]:
-    lengths = [_whole(row[6]) for row in rows]
-    total = sum(lengths)
-    if total * _BYTES_A_WORD != len(rest):
-        raise ValueError(f"{len(rest)} bytes of words instead of {total * _BYTES_A_WORD}")
-    words = np.frombuffer(rest, "<u2", total).astype(np.uint16)
-    counts = np.frombuffer(rest, "<u2", total, offset=2 * total).astype(np.uint16)
-    if total and (int(words.max()) >= len(vocabulary()) or not counts.all()):
-        raise ValueError("words or counts that cannot be")
+def _maps(rows: Sequence[Any]) -> tuple[IndexedMap, ...]:
     maps = []
-    at = 0
-    for (name, image, *stamps, _), length in zip(rows, lengths, strict=True):
-        own = words[at : at + length]
-        if (np.diff(own.astype(np.int64)) <= 0).any():
-            raise ValueError("words out of order")
-        size, changed, image_size, image_changed = map(_whole, stamps)
-        maps.append(
-            IndexedMap(
-                _inside(_text(name)),
-                _text(image),
-                (Stamp(size, changed), Stamp(image_size, image_changed)),
-                Signature(own, counts[at : at + length]),
-            )
-        )
-        at += length
+    for name, image, *numbers in rows:
+        size, changed, image_size, image_changed = map(_whole, numbers)
+        stamps = Stamp(size, changed), Stamp(image_size, image_changed)
+        maps.append(IndexedMap(_inside(_text(name)), _text(image), stamps))
     if len({m.name for m in maps}) != len(maps):
         raise ValueError("a map is in it twice")
     return tuple(maps)
+
+
+def _ranking(count: int, rest: bytes) -> Ranking:
+    words = word_count()
+    needed = 4 * count + 4 * words + words * count
+    if len(rest) != needed:
+        raise ValueError(f"{len(rest)} bytes of signatures instead of {needed}")
+    lengths = np.frombuffer(rest, "<f4", count).astype(np.float32)
+    owners = np.frombuffer(rest, "<u4", words, 4 * count).astype(np.uint32)
+    weights = np.frombuffer(rest, np.uint8, words * count, 4 * (count + words)).reshape(words, count)
+    # Weights may be any bytes.
+    if not (np.isfinite(lengths).all() and (lengths >= 0).all() and (owners <= count).all()):
+        raise ValueError("lengths or counts that cannot be")
+    return Ranking(weights, owners, lengths)
 
 
 def _whole(value: object) -> int:
@@ -151,12 +142,7 @@ def _text(value: object) -> str:
 
 def _inside(name: str) -> str:
     """Check that a name stays inside the folder of maps."""
-    path = PurePosixPath(name)
-    if (
-        not path.parts
-        or path.is_absolute()
-        or ".." in path.parts
-        or path.suffix.lower() not in (".yaml", ".yml")
-    ):
+    parts = name.split("/")
+    if not parts[0] or ".." in parts or not parts[-1].lower().endswith((".yaml", ".yml")):
         raise ValueError("the name of a map that leads out of the folder of maps, or to no map")
     return name

@@ -1,13 +1,14 @@
-"""Which signatures look like one: the cosine of word counts, rare words weighing more."""
+"""Which signatures look like one: the cosine of word weights, rare words weighing more."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mapmeld.index.signature import Signature, vocabulary
+from mapmeld.index.signature import Signature, word_count
 
 Doubles = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -16,45 +17,59 @@ _LEAST_RARITY = 0.1
 """Keeps words that all maps have: in an index of a few maps these may be all there are."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class Ranking:
-    """Signatures made ready to be compared with others, many at a time.
+    """Signatures side by side, ready to be compared with others.
 
-    Word counts are taken as shares of a map's views, and of them the square root (a place that
-    repeats itself counts for less, after Jegou, Douze, Schmid 2009), times the inverse document frequency
-    (Sparck Jones 1972) among the signatures given: words that most maps have tell little.
+    Weights are multiplied with the inverse document frequency (Sparck Jones 1972) of their words among the
+    signatures: words that most maps have tell little.
 
-    Parameters
+    Attributes
     ----------
-    signatures
-        Those to choose from.
+    weights
+        uint8 (words, n): a row for each word, so that a map that is looked for needs its own words' only.
+    owners
+        uint32 (words,): how many of the signatures have a word.
+    lengths
+        float32 (n,): Euclidean lengths of the weights times the rarities.
     """
 
-    def __init__(self, signatures: Sequence[Signature]) -> None:
-        starts = np.cumsum([0, *(len(s.words) for s in signatures)])
-        words = np.concatenate([np.zeros(0, np.uint16), *(s.words for s in signatures)]).astype(np.intp)
-        counts = np.concatenate([np.zeros(0), *(s.counts for s in signatures)]).astype(np.float64)
-        self._count = len(signatures)
-        owner = np.repeat(np.arange(self._count), np.diff(starts))
-        k = len(vocabulary())
-        self._rarity = np.log((1 + self._count) / (1 + np.bincount(words, minlength=k))) + _LEAST_RARITY
-        value = np.sqrt(counts) * self._rarity[words]
-        length = np.sqrt(np.bincount(owner, value**2, self._count))
-        value /= np.where(length > 0, length, 1)[owner]
-        # By word: a map that is looked for needs its own words only.
-        order = np.argsort(words.astype(np.uint16), kind="stable")  # of 16 bits: sorted by radix
-        self._owner, self._value = owner[order], value[order].astype(np.float32)
-        self._of_word = np.searchsorted(words[order], np.arange(k + 1))
+    weights: NDArray[np.uint8]
+    owners: NDArray[np.uint32]
+    lengths: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, signatures: Sequence[Signature]) -> Ranking:
+        """Make signatures ready."""
+        weights = np.zeros((word_count(), len(signatures)), np.uint8)
+        for n, signature in enumerate(signatures):
+            weights[:, n] = signature.weights
+        owners = np.count_nonzero(weights, axis=1).astype(np.uint32)
+        squares = np.square(_rarity(owners, len(signatures)))
+        squared = np.zeros(len(signatures))
+        for row, square in zip(weights, squares, strict=True):
+            squared += np.square(row.astype(np.float64)) * square
+        return cls(weights, owners, np.sqrt(squared).astype(np.float32))
+
+    @property
+    def count(self) -> int:
+        """How many signatures there are."""
+        return self.weights.shape[1]
+
+    def signature(self, number: int) -> Signature:
+        """Return one of the signatures."""
+        return Signature(np.ascontiguousarray(self.weights[:, number]))
 
     def scores(self, signature: Signature) -> Doubles:
         """Return how much each of the signatures looks like this one (count,), 0..1."""
-        words = signature.words.astype(np.intp)
-        value = np.sqrt(signature.counts.astype(np.float64)) * self._rarity[words]
+        words = np.flatnonzero(signature.weights)
+        rarity = _rarity(self.owners, self.count)[words]
+        value = signature.weights[words] * rarity
         length = float(np.linalg.norm(value))
-        found = np.zeros(self._count)
-        for word, weight in zip(words, value / (length or 1.0), strict=True):
-            at = slice(self._of_word[word], self._of_word[word + 1])
-            found[self._owner[at]] += weight * self._value[at]  # no map twice among the owners of a word
-        return found
+        found = np.zeros(self.count)
+        for word, weight in zip(words, value * rarity / (length or 1.0), strict=True):
+            found += weight * self.weights[word]
+        return np.asarray(found / np.where(self.lengths > 0, self.lengths, np.inf))
 
     def best(self, signature: Signature) -> tuple[Index, Doubles]:
         """Return the numbers of the signatures with words in common with this one, and scores, best first."""
@@ -64,9 +79,13 @@ class Ranking:
         return order, scores[order]
 
 
+def _rarity(owners: NDArray[np.uint32], count: int) -> Doubles:
+    return np.asarray(np.log((1 + count) / (1 + owners.astype(np.float64))) + _LEAST_RARITY)
+
+
 def likely_pairs(signatures: Sequence[Signature], candidates: int) -> list[tuple[int, int]]:
     """Return pairs (i, j), i < j, in which one map is among so many that look most like the other."""
-    ranking = Ranking(signatures)
+    ranking = Ranking.of(signatures)
     pairs = set()
     for i, signature in enumerate(signatures):
         order, _ = ranking.best(signature)

@@ -1,7 +1,7 @@
-"""The signature of a map: which words, and how often, describe what its walls look like.
+"""The signature of a map: which words, and how much wall of each, describe what its walls look like.
 
-A bag of words (Sivic, Zisserman 2003): every view of a wall counts for the word nearest to it. Where
-things lie is left out, so two maps that share a part
+A bag of words (Sivic, Zisserman 2003): every view of a wall counts for the word nearest to it, by the length of
+wall that it stands for. Where things lie is left out, so two maps that share a part
 of a place share the words of that part, however each of them is turned, moved, cut or sampled.
 """
 
@@ -17,29 +17,28 @@ from numpy.typing import NDArray
 
 from mapmeld.grid import OccupancyGrid
 from mapmeld.index import views
-from mapmeld.index.views import SIZE, wall_views
-from mapmeld.matching.correlative.wall_map import Floats
+from mapmeld.index.views import REACHES, SIZE, Views, wall_views
+from mapmeld.matching.correlative.wall_map import Doubles, Floats
 
-VOCABULARY = "words.bin"
-"""File of the words (k, SIZE) in the package, a byte for each number, by `benchmarks/train_words.py`."""
+VOCABULARY = ("near_words.bin", "wide_words.bin")
+"""Files of the words (k, SIZE) of each reach, a byte for each number, by `benchmarks/train_words.py`."""
 
-_METHOD = 1  # changes with the code of this module and of `views`
+_METHOD = 2  # changes with the code of this module and of `views`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signature:
-    """Which words describe a map, and by how many views each.
+    """How much of a map looks like each word.
 
     Attributes
     ----------
-    words
-        uint16 (n,), growing.
-    counts
-        uint16 (n,), above 0: views that look like the word.
+    weights
+        uint8 (`word_count()`,): square roots of the shares of wall, 255 being all of it (a place that
+        repeats itself counts for less, after Jegou, Douze, Schmid 2009), for the words of one reach
+        after the other; all 0 without walls.
     """
 
-    words: NDArray[np.uint16]
-    counts: NDArray[np.uint16]
+    weights: NDArray[np.uint8]
 
 
 def signature_of(grid: OccupancyGrid) -> Signature:
@@ -47,20 +46,35 @@ def signature_of(grid: OccupancyGrid) -> Signature:
     return describe(wall_views(grid), vocabulary())
 
 
-def describe(seen: Floats, words: Floats) -> Signature:
-    """Count views (n, SIZE) for the nearest of the words (k, SIZE)."""
-    if not len(seen):
-        return Signature(np.zeros(0, np.uint16), np.zeros(0, np.uint16))
+def describe(views_: Views, words: tuple[Floats, ...]) -> Signature:
+    """Count views for the nearest of the words (k, SIZE) of their reach."""
+    parts = [_shares(seen, views_.metres, some) for seen, some in zip(views_.seen, words, strict=True)]
+    return Signature(np.rint(255 * np.sqrt(np.concatenate(parts))).astype(np.uint8))
+
+
+def _shares(seen: Floats, metres: Floats, words: Floats) -> Doubles:
+    nearest = nearest_word(seen, words)
+    # Without anything in reach a view has no length, and no word.
+    lengths = np.bincount(nearest, metres * seen.any(axis=1), len(words))
+    return np.asarray(lengths / (lengths.sum() or 1.0))
+
+
+def nearest_word(seen: Floats, words: Floats) -> NDArray[np.intp]:
+    """Return which of the words (k, SIZE) is nearest to each view (n, SIZE)."""
     # Less the squared length of the view, which is the same for all words.
-    nearest = np.argmax(seen @ words.T * 2 - np.square(words).sum(axis=1), axis=1)
-    found, counts = np.unique(nearest, return_counts=True)
-    return Signature(found.astype(np.uint16), counts.astype(np.uint16))
+    return np.argmax(seen @ words.T * 2 - np.square(words).sum(axis=1), axis=1)
 
 
 @cache
-def vocabulary() -> Floats:
-    """Return the words (k, SIZE), views that stand for all that look like them."""
-    return words_from(_packed())
+def vocabulary() -> tuple[Floats, ...]:
+    """Return for each reach the words (k, SIZE), views that stand for all that look like them."""
+    return tuple(words_from(packed) for packed in _packed())
+
+
+@cache
+def word_count() -> int:
+    """Return how many words there are."""
+    return sum(map(len, _packed())) // SIZE
 
 
 def words_from(packed: bytes) -> Floats:
@@ -73,12 +87,13 @@ def packed_words(words: Floats) -> bytes:
     return np.rint(words * 255).astype(np.uint8).tobytes()
 
 
-def _packed() -> bytes:
-    return (files("mapmeld.index") / VOCABULARY).read_bytes()
+@cache
+def _packed() -> tuple[bytes, ...]:
+    return tuple((files("mapmeld.index") / name).read_bytes() for name in VOCABULARY)
 
 
 @cache
 def signature_version() -> str:
     """Return a text that differs as soon as signatures would: those of two versions do not compare."""
-    how = (_METHOD, views.RINGS, views.SECTORS, views.MOST)
-    return hashlib.blake2b(repr(how).encode() + _packed(), digest_size=8).hexdigest()
+    how = (_METHOD, REACHES, views.SECTORS, views.MOST)
+    return hashlib.blake2b(repr(how).encode() + b"".join(_packed()), digest_size=8).hexdigest()
