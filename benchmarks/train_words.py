@@ -52,7 +52,9 @@ def centres(seen: Floats, count: int, seed: int) -> Floats:
         for first in range(0, len(seen), AT_ONCE):
             some = seen[first : first + AT_ONCE]
             nearest = nearest_word(some, words)
-            sums += coo_matrix((np.ones(len(some)), (nearest, np.arange(len(some)))), (count, len(some))) @ some
+            sums += (
+                coo_matrix((np.ones(len(some)), (nearest, np.arange(len(some)))), (count, len(some))) @ some
+            )
             members += np.bincount(nearest, minlength=count)
         words[members > 0] = (sums[members > 0] / members[members > 0, None]).astype(np.float32)
     return words

@@ -1,7 +1,7 @@
 import contextlib
-import hashlib
 import json
 import os
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -52,8 +52,8 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert [m.name for m in found.maps] == ["floor/west.yaml", "office.yaml", "school.yaml"]
     for a, b in zip(index.maps, found.maps, strict=True):
         assert (a.image, a.stamps) == (b.image, b.stamps)
-        assert np.array_equal(a.signature.words, b.signature.words)
-        assert np.array_equal(a.signature.counts, b.signature.counts)
+    for what in ("weights", "owners", "lengths"):
+        assert np.array_equal(getattr(index.ranking, what), getattr(found.ranking, what))
     assert is_index(tmp_path / "i")
     assert not is_index(tmp_path / "maps" / "office.yaml")
     assert not is_index(tmp_path / "none")
@@ -89,7 +89,7 @@ def test_truncated_anywhere_in_the_words(tmp_path: Path, written: bytes) -> None
 
 
 def test_another_version(tmp_path: Path, written: bytes) -> None:
-    assert "another version" in refused(tmp_path / "i", written.replace(b"index 1\n", b"index 2\n", 1))
+    assert "another version" in refused(tmp_path / "i", written.replace(b"index 2\n", b"index 3\n", 1))
     head, rest = parts(written)
     assert "another version" in refused(tmp_path / "i", joined({**head, "signatures": "old"}, rest))
 
@@ -99,10 +99,10 @@ def test_no_index_at_all(tmp_path: Path) -> None:
     assert "is not an index" in refused(tmp_path / "i", b"m")
 
 
-@pytest.mark.parametrize("count", [1 << 62, 1 << 70, -1, 1.5, True, "7", None])
+@pytest.mark.parametrize("count", [1 << 70, -1, 1.5, True, "7", None])
 def test_sizes_are_not_believed(tmp_path: Path, written: bytes, count: object) -> None:
     head, rest = parts(written)
-    head["maps"][0][6] = count
+    head["maps"][0][2] = count
     assert "is damaged" in refused(tmp_path / "i", joined(head, rest))
 
 
@@ -124,7 +124,7 @@ def test_heads_that_are_something_else(tmp_path: Path, head: object) -> None:
 @pytest.mark.parametrize("maps", [3, [3], [[]], [["a.yaml"]], {"a": 1}, None])
 def test_maps_that_are_something_else(tmp_path: Path, written: bytes, maps: object) -> None:
     head, _ = parts(written)
-    nothing = hashlib.blake2b(b"", digest_size=16).hexdigest()
+    nothing = zlib.crc32(b"")
     assert "is damaged" in refused(tmp_path / "i", joined({**head, "maps": maps, "checksum": nothing}, b""))
 
 
@@ -132,13 +132,11 @@ def test_deep_nesting(tmp_path: Path) -> None:
     assert "is damaged" in refused(tmp_path / "i", MAGIC + b"[" * 200_000 + b"\n")
 
 
-@pytest.mark.parametrize("number", [0xFFFF, 0])
-def test_words_that_cannot_be(tmp_path: Path, written: bytes, number: int) -> None:
+@pytest.mark.parametrize("length", [np.nan, np.inf, -1.0])
+def test_lengths_that_cannot_be(tmp_path: Path, written: bytes, length: float) -> None:
     head, rest = parts(written)
-    words = np.frombuffer(rest, "<u2").copy()
-    words[: len(words) // 2 if number else 3] = number
-    changed = words.tobytes()
-    head["checksum"] = hashlib.blake2b(changed, digest_size=16).hexdigest()
+    changed = np.array(length, "<f4").tobytes() + rest[4:]
+    head["checksum"] = zlib.crc32(changed)
     assert "is damaged" in refused(tmp_path / "i", joined(head, changed))
 
 
