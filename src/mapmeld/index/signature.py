@@ -1,7 +1,7 @@
 """The signature of a map: which words, and how much wall of each, describe what its walls look like.
 
-A bag of words (Sivic, Zisserman 2003): every view of a wall counts for the word nearest to it, by the length of
-wall that it stands for. Where things lie is left out, so two maps that share a part
+A bag of words (Sivic, Zisserman 2003): every view of a wall counts for the word nearest to it, by the length
+of wall that it stands for. Where things lie is left out, so two maps that share a part
 of a place share the words of that part, however each of them is turned, moved, cut or sampled.
 """
 
