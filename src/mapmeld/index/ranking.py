@@ -54,7 +54,7 @@ class Ranking:
     @property
     def count(self) -> int:
         """How many signatures there are."""
-        return self.weights.shape[1]
+        return len(self.lengths)
 
     def signature(self, number: int) -> Signature:
         """Return one of the signatures."""

@@ -62,7 +62,7 @@ def _shares(seen: Floats, metres: Floats, words: Floats) -> Doubles:
 def nearest_word(seen: Floats, words: Floats) -> NDArray[np.intp]:
     """Return which of the words (k, SIZE) is nearest to each view (n, SIZE)."""
     # Less the squared length of the view, which is the same for all words.
-    return np.argmax(seen @ words.T * 2 - np.square(words).sum(axis=1), axis=1)
+    return np.asarray(np.argmax(seen @ words.T * 2 - np.square(words).sum(axis=1), axis=1))
 
 
 @cache
