@@ -49,6 +49,9 @@ def printed_by(schema: str, folder: Path) -> Any:
     a, b, _ = maps
     if schema == "mapmeld.match/1":
         return run("match", a, b, "--json")
+    if schema == "mapmeld.find/1":
+        run("index", folder, "-o", folder / "i")
+        return run("find", a, "--in", folder / "i", "--json")
     if schema == "mapmeld.bag.info/1":
         return run("bag", "info", RECORDING, "--json")
     if schema == "mapmeld.merge/1":
@@ -74,6 +77,7 @@ def printed_by(schema: str, folder: Path) -> Any:
     [
         "mapmeld.match/1",
         "mapmeld.merge/1",
+        "mapmeld.find/1",
         "mapmeld.bag.info/1",
         "mapmeld.diff/1",
         "mapmeld.rebase/1",

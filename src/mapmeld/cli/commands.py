@@ -23,8 +23,10 @@ from mapmeld.cli.diff import diff
 from mapmeld.cli.environment import environment
 from mapmeld.cli.errors import BAD_INPUT, CLOSED_PIPE, FAULT, INTERRUPTED, NO_MATCH, say
 from mapmeld.cli.explain import explain
+from mapmeld.cli.find import find
 from mapmeld.cli.follow import follow
 from mapmeld.cli.graph import graph
+from mapmeld.cli.index import index
 from mapmeld.cli.match import match
 from mapmeld.cli.merge import merge
 from mapmeld.cli.navigability import navigability
@@ -159,17 +161,11 @@ def _options(
 
 
 _TAKES_SETTINGS: tuple[Callable[..., None], ...] = (
-    match, merge, graph, follow, diff, rebase, transform_points, show, explain,
+    match, merge, graph, find, follow, diff, rebase, transform_points, show, explain,
 )  # fmt: skip
 _OTHERS: tuple[Callable[..., None], ...] = (
-    navigability,
-    demo,
-    benchmark,
-    environment,
-    simulate,
-    slam,
-    reproduce,
-)
+    index, navigability, demo, benchmark, environment, simulate, slam, reproduce,
+)  # fmt: skip
 
 for _command in _TAKES_SETTINGS:
     app.command(cls=WithSettings)(_command)

@@ -11,6 +11,7 @@ import typer
 from mapmeld.cli.errors import NO_MATCH
 from mapmeld.cli.options import (
     DEFAULT_METHOD,
+    Candidates,
     Cluster,
     Force,
     Json,
@@ -43,6 +44,7 @@ def graph(
     workers: Workers = 1,
     cluster: Cluster = None,
     store: Store = None,
+    candidates: Candidates = None,
     force: Force = False,
     json: Json = False,
     method: Method = DEFAULT_METHOD,
@@ -71,7 +73,7 @@ def graph(
     started = time.perf_counter()
     with working(f"Reading {len(maps)} maps"):
         grids = load_maps(maps, resolution)
-    with progress_of(len(maps), Strategy.GRAPH, matching) as on_pair:
+    with progress_of(len(maps), Strategy.GRAPH, matching, candidates) as on_pair:
         found = map_graph(
             grids,
             method=method,
@@ -82,6 +84,7 @@ def graph(
             workers=0 if workers == 1 else workers,
             cluster=cluster,
             store=store,
+            candidates=candidates,
             on_pair=on_pair,
         )
     fields = graph_fields(found, method, parameters, maps, time.perf_counter() - started)

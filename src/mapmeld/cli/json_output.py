@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from mapmeld.evaluation import Navigability, Reach
     from mapmeld.grid import OccupancyGrid
     from mapmeld.history import Step
+    from mapmeld.index import Candidate, MapIndex
     from mapmeld.io.recordings import RecordingInfo
     from mapmeld.matching import MatchResult
     from mapmeld.merging import MergeResult, PairMatch
@@ -38,6 +39,7 @@ NAVIGABILITY_SCHEMA = "mapmeld.navigability/1"
 STEP_SCHEMA = "mapmeld.follow.step/1"
 FOLLOW_SCHEMA = "mapmeld.follow/1"
 GRAPH_SCHEMA = "mapmeld.graph/1"
+FIND_SCHEMA = "mapmeld.find/1"
 
 Fields = dict[str, Any]
 
@@ -146,6 +148,44 @@ def graph_fields(
         ],
         "pairs": [_pair_fields(pair) for pair in graph.pairs],
         "seconds": seconds,
+    }
+
+
+def find_fields(
+    found: Sequence[Candidate],
+    index: MapIndex,
+    method: str,
+    parameters: Any,
+    paths: Sequence[str],
+    seconds: float,
+) -> Fields:
+    """Return the fields of schema mapmeld.find/1."""
+    return {
+        "schema": FIND_SCHEMA,
+        "mapmeld": __version__,
+        "map": paths[0],
+        "index": paths[1],
+        "indexed": len(index.maps),
+        "method": method,
+        "parameters": asdict(parameters),
+        "candidates": [
+            {
+                "path": str(candidate.path),
+                "score": candidate.score,
+                "problem": candidate.problem or None,
+                "match": None if candidate.result is None else _found_fields(candidate.result),
+            }
+            for candidate in found
+        ],
+        "seconds": seconds,
+    }
+
+
+def _found_fields(result: MatchResult) -> Fields:
+    return {
+        **_evidence(result),
+        "covariance": None if result.covariance is None else result.covariance.tolist(),
+        "seconds": result.seconds,
     }
 
 

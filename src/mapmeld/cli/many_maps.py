@@ -31,10 +31,16 @@ def known_for(
 
 
 @contextmanager
-def progress_of(count: int, strategy: Strategy, matching: bool) -> Iterator[Callable[[], None] | None]:
+def progress_of(
+    count: int, strategy: Strategy, matching: bool, candidates: int | None
+) -> Iterator[Callable[[], None] | None]:
     """Show a bar over the pairs of so many maps while the block runs, a spinner where none are counted."""
     if strategy is Strategy.GRAPH and matching:
-        with counting("Matching pairs", count * (count - 1) // 2) as step:
+        most = count * (count - 1) // 2
+        # Two maps may be candidates of one another: fewer pairs, but how many is known only by and by.
+        with counting(
+            "Matching pairs", most if candidates is None else min(most, count * candidates)
+        ) as step:
             yield step
     else:
         with working(f"Merging {count} maps"):

@@ -11,6 +11,7 @@ import typer
 from mapmeld.cli.errors import NO_MATCH, say
 from mapmeld.cli.options import (
     DEFAULT_METHOD,
+    Candidates,
     Cluster,
     Force,
     Fusion,
@@ -69,6 +70,7 @@ def merge(
     workers: Workers = 1,
     cluster: Cluster = None,
     store: Store = None,
+    candidates: Candidates = None,
     force: Force = False,
     json: Json = False,
     method: Method = DEFAULT_METHOD,
@@ -95,7 +97,7 @@ def merge(
     started = time.perf_counter()
     with working(f"Reading {len(maps)} maps"):
         grids = load_maps(maps, resolution)
-    with progress_of(len(maps), strategy, matching) as on_pair:
+    with progress_of(len(maps), strategy, matching, candidates) as on_pair:
         result = merge_maps(
             grids,
             method=method,
@@ -108,6 +110,7 @@ def merge(
             workers=0 if workers == 1 else workers,
             cluster=cluster,
             store=store,
+            candidates=candidates,
             on_pair=on_pair,
         )
     seconds = time.perf_counter() - started

@@ -77,6 +77,15 @@ Cluster = Annotated[
     str | None,
     typer.Option("--cluster", metavar="ADDRESS", help="Work on the Dask cluster of this scheduler instead."),
 ]
+Candidates = Annotated[
+    int | None,
+    typer.Option(
+        "--candidates",
+        metavar="K",
+        min=1,
+        help="Match each map only with the K that look most like it (docs/map_index.md), not with all.",
+    ),
+]
 Store = Annotated[
     Path | None,
     typer.Option("--store", metavar="DIR", help="Keep all matches there; a second run goes on from it."),

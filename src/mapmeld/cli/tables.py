@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from mapmeld.index import Candidate, MapIndex
     from mapmeld.matching import MatchResult
     from mapmeld.merging import MergeResult, PairMatch
     from mapmeld.merging.graph import MapGraph
@@ -150,6 +151,45 @@ def print_graph(graph: MapGraph, names: Sequence[str]) -> None:
             table.add_row(str(i + 1), Text(names[i]), *_numbers(graph.poses[i]), *spread)
         print_table(table)
     print_pairs(graph.pairs, names)
+
+
+def print_found(found: Sequence[Candidate], index: MapIndex, name: str) -> None:
+    """Print the maps that may show the same place as the map of that name, and where it lies in them."""
+    if not found:
+        print_lines(f"None of the {len(index.maps)} maps in the index looks like {name}.")
+        return
+    table = Table(box=None, padding=(0, 2, 0, 0), header_style="dim", pad_edge=False)
+    table.add_column("map", overflow="fold")
+    matched = any(candidate.result is not None or candidate.problem for candidate in found)
+    for heading in ("looks", *(("x [m]", "y [m]", "theta [deg]", "probability") if matched else ())):
+        table.add_column(Text(heading), justify="right", no_wrap=True)
+    if matched:
+        table.add_column("", no_wrap=True)
+    for candidate in found:
+        row: list[Text | str] = [
+            Text(printable(_within(candidate.path, index.root))),
+            rounded(candidate.score, 3),
+        ]
+        result = candidate.result
+        if result is not None:
+            numbers = ["-"] * 3 if result.T_a_b is None else _numbers(result.T_a_b)
+            verdict = str(result.verdict)
+            row += [
+                *numbers,
+                probability_text(result.probability),
+                Text(verdict, style=_COLOUR_OF.get(verdict, "")),
+            ]
+        elif candidate.problem:
+            row += [*["-"] * 4, Text("cannot be read", style="bold red")]
+        table.add_row(*row)
+    what = "Where it lies in the frame of each" if matched else "By looks alone; nothing was matched"
+    line = f"The {len(found)} of {len(index.maps)} maps that look most like {name}. {what}:"
+    console().print(Text(printable(line), style="bold"), soft_wrap=True)
+    print_table(table)
+
+
+def _within(path: Path, root: Path) -> str:
+    return path.relative_to(root).as_posix() if path.is_relative_to(root) else str(path)
 
 
 def print_pairs(pairs: Sequence[PairMatch], names: Sequence[str]) -> None:

@@ -29,6 +29,7 @@ def map_graph(
     workers: int = 0,
     cluster: str | None = None,
     store: Path | None = None,
+    candidates: int | None = None,
     on_pair: Callable[[], object] | None = None,
 ) -> MapGraph:
     """Match every pair and solve the graph; the parameters are those of `mapmeld.merge`.
@@ -54,6 +55,7 @@ def map_graph(
             workers=workers,
             cluster=cluster,
             store=store,
+            candidates=candidates,
             on_pair=on_pair,
         )
     return solve(grids, matches, known_poses, SOLVERS[solver])
@@ -70,6 +72,7 @@ def placed_by_graph(
     workers: int,
     cluster: str | None,
     store: Path | None,
+    candidates: int | None,
     on_pair: Callable[[], object] | None,
 ) -> Placement:
     """Place maps as the graph says; the parameters are those of `mapmeld.merge`."""
@@ -83,6 +86,7 @@ def placed_by_graph(
         workers=workers,
         cluster=cluster,
         store=store,
+        candidates=candidates,
         on_pair=on_pair,
     )
     first = set(graph.components[0])

@@ -35,6 +35,7 @@ def merge(
     workers: int = 0,
     cluster: str | None = None,
     store: str | os.PathLike[str] | None = None,
+    candidates: int | None = None,
     on_pair: Callable[[], object] | None = None,
 ) -> MergeResult:
     """Match maps and merge those that fit.
@@ -60,7 +61,7 @@ def merge(
         False places maps by `known_poses` alone.
     solver
         Of the robust optimisation: our own, or GTSAM's (extra ``gtsam``).
-    workers, cluster, store, on_pair
+    workers, cluster, store, candidates, on_pair
         As for `mapmeld.merging.graph.match_all_pairs`.
 
     Raises
@@ -83,9 +84,13 @@ def merge(
         raise MergeError(f"{len(maps)} maps need {len(maps)} start poses, not {len(starts)}")
     if strategy not in STRATEGIES:
         raise MergeError(f"unknown strategy {strategy!r}: choose from {', '.join(STRATEGIES)}")
-    of_the_graph = (known_poses, not matching, solver != "own", workers, cluster, store)
+    of_the_graph = (known_poses, not matching, solver != "own", workers, cluster, store, candidates)
     if strategy == "sequential" and any(of_the_graph):
-        raise MergeError("known poses, solvers, workers, clusters and stores are for strategy 'graph'")
+        raise MergeError(
+            "known poses, solvers, workers, clusters, stores and candidates are for strategy 'graph'"
+        )
+    if candidates is not None and candidates < 1:
+        raise MergeError(f"each map needs one candidate or more, not {candidates}")
     check_fusion(fusion)  # before the long work
     grids = [m if isinstance(m, OccupancyGrid) else load(m) for m in maps]
     if strategy == "sequential":
@@ -101,6 +106,7 @@ def merge(
             workers=workers,
             cluster=cluster,
             store=None if store is None else Path(store),
+            candidates=candidates,
             on_pair=on_pair,
         )
     return _drawn(grids, placed, fusion, starts or [Pose2()] * len(grids))

@@ -1,4 +1,4 @@
-"""Every map matched with every other."""
+"""Every map matched with every other, or with those that look like it."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ import numpy as np
 
 from mapmeld.fingerprint import code_version, grid_digest, parameters_json
 from mapmeld.grid import OccupancyGrid
+from mapmeld.index.ranking import likely_pairs
+from mapmeld.index.signature import signature_of
 from mapmeld.matching import DEFAULT_METHOD, Alternative, MatchResult, Verdict, match, method_named
 from mapmeld.parallel import Shared, run_jobs
 from mapmeld.parquet_rows import RowStore
@@ -135,6 +137,7 @@ def match_all_pairs(
     workers: int = 0,
     cluster: str | None = None,
     store: Path | None = None,
+    candidates: int | None = None,
     on_pair: Callable[[], object] | None = None,
 ) -> tuple[tuple[int, int, MatchResult], ...]:
     """Match every map with every later one; return (i, j, result) in order.
@@ -150,6 +153,9 @@ def match_all_pairs(
     store
         A folder that keeps every result as it comes (extra ``store``). What is in it already, of the
         same maps, settings and code, is not matched again.
+    candidates
+        Match only pairs in which one map is among so many that look most like the other, by their
+        signatures (`mapmeld.index`), in place of all.
     on_pair
         Called for each pair as it is done.
 
@@ -159,7 +165,7 @@ def match_all_pairs(
         As said there.
     """
     settings = method_named(method).parameters() if parameters is None else parameters
-    pairs = list(combinations(range(len(maps)), 2))
+    pairs = _pairs(maps, candidates)
     done: dict[tuple[int, int], MatchResult] = {}
     keys: Mapping[tuple[int, int], PairKey] = {}
     if store is not None:
@@ -195,6 +201,12 @@ def match_all_pairs(
         if store is not None and batch:
             PAIR_STORE.add(store, batch)
     return tuple((i, j, done[i, j]) for i, j in pairs)
+
+
+def _pairs(maps: Sequence[OccupancyGrid], candidates: int | None) -> list[tuple[int, int]]:
+    if candidates is None or candidates >= len(maps) - 1:
+        return list(combinations(range(len(maps)), 2))
+    return likely_pairs([signature_of(grid) for grid in maps], candidates)
 
 
 def _keys(

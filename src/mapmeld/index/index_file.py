@@ -1,0 +1,148 @@
+"""An index as one file.
+
+    line 1     ``mapmeld index 2``
+    line 2     JSON of one line: version of the signatures, folder of maps (relative to the file), of each
+               map its name, image and two stamps; and a checksum of all that follows
+    the rest   lengths of the signatures, float32; owners of each word, uint32; weights, uint8, a row for
+               each word: all that a query needs is there, and nothing is made ready; little-endian
+
+Nothing in it is executed, and no size is believed that the file's own size does not bear out.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mapmeld.index.entries import IndexedMap, MapIndex, MapIndexError, Stamp
+from mapmeld.index.ranking import Ranking
+from mapmeld.index.signature import signature_version, word_count
+from mapmeld.io import MapFileError
+from mapmeld.io.atomic import write_files
+from mapmeld.io.images import open_regular
+
+MAGIC = b"mapmeld index 2\n"
+MAX_BYTES = 1 << 32
+"""Largest file that is read; a map takes about 6 KB."""
+
+
+def write_index(index: MapIndex, path: Path) -> None:
+    """Write an index whole or not at all, in the place of one that is there.
+
+    Raises
+    ------
+    MapFileError
+        The file cannot be written.
+    """
+    ranking = index.ranking
+    arrays = (ranking.lengths.astype("<f4"), ranking.owners.astype("<u4"), ranking.weights)
+    rest = b"".join(array.tobytes() for array in arrays)
+    head = {
+        "signatures": signature_version(),
+        "maps_in": Path(os.path.relpath(index.root.resolve(), path.resolve().parent)).as_posix(),
+        "maps": [
+            [m.name, m.image, *(number for s in m.stamps for number in (s.size, s.changed))]
+            for m in index.maps
+        ],
+        "checksum": zlib.crc32(rest),
+    }
+    write_files([(path, [MAGIC, json.dumps(head).encode() + b"\n", rest])], force=True)
+
+
+def is_index(path: Path) -> bool:
+    """Whether a file says that it is an index, of whatever version."""
+    try:
+        with open_regular(path) as (file, _):
+            return file.read(len(MAGIC) - 2) == MAGIC[:-2]
+    except MapFileError:
+        return False
+
+
+def read_index(path: Path) -> MapIndex:
+    """Read an index.
+
+    Raises
+    ------
+    MapFileError
+        There is no such file, or it cannot be read.
+    MapIndexError
+        It is no index, of another version, or damaged.
+    """
+    with open_regular(path) as (file, size):
+        if size > MAX_BYTES:
+            raise MapIndexError.of(path, f"is too large for an index ({size:,} bytes, {MAX_BYTES:,} at most)")
+        magic = file.read(len(MAGIC))
+        if magic != MAGIC:
+            if magic[:-2] == MAGIC[:-2]:
+                raise MapIndexError.of(path, _OTHER_VERSION)
+            raise MapIndexError.of(path, "is not an index of mapmeld; 'mapmeld index' makes one")
+        head, rest = file.readline(), file.read()
+    try:
+        fields = json.loads(head)
+        if fields["signatures"] != signature_version():
+            raise MapIndexError.of(path, _OTHER_VERSION)
+        if fields["checksum"] != zlib.crc32(rest):
+            raise ValueError("its checksum is wrong")
+        maps = _maps(fields["maps"])
+        ranking = _ranking(len(maps), rest)
+        root = Path(os.path.normpath(path.resolve().parent / _text(fields["maps_in"])))
+    except (ValueError, TypeError, KeyError, IndexError, RecursionError, OverflowError) as error:
+        what = f"it has no {error}" if isinstance(error, KeyError) else " ".join(str(error).split())[:150]
+        raise MapIndexError.of(
+            path, f"is damaged ({what}); make it again with 'mapmeld index --force'"
+        ) from None
+    return MapIndex(root, maps, ranking)
+
+
+_OTHER_VERSION = "was made by another version of mapmeld; make it again with 'mapmeld index --force'"
+
+
+def _maps(rows: Sequence[Any]) -> tuple[IndexedMap, ...]:
+    maps = []
+    for name, image, *numbers in rows:
+        size, changed, image_size, image_changed = map(_whole, numbers)
+        stamps = Stamp(size, changed), Stamp(image_size, image_changed)
+        maps.append(IndexedMap(_inside(_text(name)), _text(image), stamps))
+    if len({m.name for m in maps}) != len(maps):
+        raise ValueError("a map is in it twice")
+    return tuple(maps)
+
+
+def _ranking(count: int, rest: bytes) -> Ranking:
+    words = word_count()
+    needed = 4 * count + 4 * words + words * count
+    if len(rest) != needed:
+        raise ValueError(f"{len(rest)} bytes of signatures instead of {needed}")
+    lengths = np.frombuffer(rest, "<f4", count).astype(np.float32)
+    owners = np.frombuffer(rest, "<u4", words, 4 * count).astype(np.uint32)
+    weights = np.frombuffer(rest, np.uint8, words * count, 4 * (count + words)).reshape(words, count)
+    # Weights may be any bytes.
+    if not (np.isfinite(lengths).all() and (lengths >= 0).all() and (owners <= count).all()):
+        raise ValueError("lengths or counts that cannot be")
+    return Ranking(weights, owners, lengths)
+
+
+def _whole(value: object) -> int:
+    if type(value) is not int or not 0 <= value < 1 << 63:
+        raise ValueError("a number that is none")
+    return value
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str) or "\0" in value:
+        raise ValueError("a name that is none")
+    return value
+
+
+def _inside(name: str) -> str:
+    """Check that a name stays inside the folder of maps."""
+    parts = name.split("/")
+    if not parts[0] or ".." in parts or not parts[-1].lower().endswith((".yaml", ".yml")):
+        raise ValueError("the name of a map that leads out of the folder of maps, or to no map")
+    return name
