@@ -29,8 +29,8 @@ def steps() -> list[Step]:
     place = office(0.1)
     first = [replace(cut(place, 0, 0, x, 12), stamp=x) for x in (4.0, 10.0, 16.0)]
     second = [
-        replace(seen_from(cut(place, x, 0, 16, 12), T_2_PLACE), stamp=stamp)
-        for x, stamp in ((15.0, 8.0), (0.0, 20.0))
+        replace(seen_from(cut(place, x, 0, 16, y), T_2_PLACE), stamp=stamp)
+        for x, y, stamp in ((13.0, 4.0, 8.0), (0.0, 12.0, 20.0))
     ]
     return list(follow(first, second))
 
