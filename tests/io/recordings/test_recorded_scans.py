@@ -230,6 +230,20 @@ def test_what_cannot_be_used_is_counted(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize("topic", ["/scan", "/odom"])
+def test_one_wrong_time_does_not_cost_the_rest(tmp_path: Path, topic: str) -> None:
+    words = Words(2)
+    sent = usual(words)
+    number = next(n for n, one in enumerate(sent) if one[1] == topic and one[0] > 0.3)
+    kind, message = sent[number][2:]
+    message.header = words.header(1e5, message.header.frame_id)
+    sent[number] = (sent[number][0], topic, kind, message)
+    stream = opened(tmp_path, sent)
+    assert len(list(stream.scans)) == (8 if topic == "/scan" else 9)
+    what = "a scan" if topic == "/scan" else "odometry"
+    assert stream.left_out == {f"{what} with a time stamp later than that of the next one": 1}
+
+
 def test_stamps_of_zero_mean_when_they_were_received(tmp_path: Path) -> None:
     words = Words(2)
     sent = [one for one in usual(words) if one[1] != "/scan"]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmeld.io import AnyPath
+from mapmeld.io.in_order import InOrder
 from mapmeld.io.odometry import OdometryTrack
 from mapmeld.io.recordings.frames import Frames, frame_name, level_pose, matrix_of
 from mapmeld.io.recordings.messages import (
@@ -191,24 +192,25 @@ def _scans(
     """Give the scans as soon as the odometry after them is known."""
     track = OdometryTrack()
     waiting: deque[tuple[float, NDArray[np.float32]]] = deque()
-    latest = -math.inf
+    scans_in_order = InOrder[NDArray[np.float32]]("a scan", left_out)
+    poses_in_order = InOrder[Pose2]("odometry", left_out, repeats=True)
     with open_recording(name, "refuse") as source:
         for message in source.messages({*scans, *odometry}):
             content = _content(name, message)
             if message.channel.type == SCAN:
                 stamp = stamp_of(content.header, message.received)
-                if stamp <= latest:
-                    left_out["a scan that is no later than the one before it"] += 1
-                    continue
-                latest = stamp
-                waiting.append((stamp, _ranges(content, mount)))
+                waiting += scans_in_order.add(stamp, _ranges(content, mount))
             else:
                 for stamp, pose in _poses(name, content, message, base):
-                    track.add(stamp, pose)
+                    for placed in poses_in_order.add(stamp, pose):
+                        track.add(*placed)
             while waiting and (
                 (track.latest is not None and track.latest >= waiting[0][0]) or len(waiting) > _MOST_WAITING
             ):
                 yield from _placed(*waiting.popleft(), track, left_out)
+    waiting += scans_in_order.rest()
+    for placed in poses_in_order.rest():
+        track.add(*placed)
     for stamp, ranges in waiting:
         yield from _placed(stamp, ranges, track, left_out)
 
