@@ -144,7 +144,7 @@ def test_what_was_passed_over_is_said(log: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
-@pytest.mark.parametrize("ending", ["SIGINT"])
+@pytest.mark.parametrize("ending", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_an_interruption_is_one_line_and_leaves_nothing(tmp_path: Path, ending: str) -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "mapmeld", "slam", LOG, "-o", "out",
