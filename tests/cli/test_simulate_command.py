@@ -218,7 +218,8 @@ def test_a_missing_library_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 'pip install "mapmeld[sim]"' in outcome.line
 
 
-def test_an_interrupted_tour_leaves_nothing(place: Path) -> None:
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_tour_leaves_nothing(place: Path, ending: signal.Signals) -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "mapmeld", "simulate", "-o", "run.mcap", "--drive", "frontier"],
         stderr=subprocess.PIPE, stdout=subprocess.PIPE,
@@ -227,7 +228,7 @@ def test_an_interrupted_tour_leaves_nothing(place: Path) -> None:
     # Not while libraries are still being loaded: Python then ends by the signal itself, after the same words.
     while not any(f.stat().st_size for f in place.glob(".mapmeld-*")) and time.monotonic() < deadline:
         time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(ending)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
     assert b"interrupted" in err
@@ -299,6 +300,29 @@ def test_the_keyboard_drives(place: Path) -> None:
     _, commands = read_drive("run.mcap")
     said = [(round(c.v, 3), round(c.w, 3)) for _, c in commands]
     assert said == [(0, 0), (0.72, 0), (0, 1.449), (0, 0)]
+
+
+@pytest.mark.parametrize("how", ["closed", "hung up", "ended"])
+def test_a_drive_is_not_lost_with_its_terminal(place: Path, how: str) -> None:
+    options = ("--furniture", 0, "--start", "2,2.5,90")
+    typist = Typist("simulate", "map.txt", "-o", "run.mcap", "--drive", "keyboard", *options)
+    assert typist.reads(r"speed 0\.80 m/s")
+    typist.types("i")
+    assert typist.reads(r"(?s)speed 0\.80 m/s.*speed 0\.80 m/s.*speed 0\.80 m/s")
+    os.close(typist.slave)
+    if how == "ended":
+        typist.process.send_signal(signal.SIGTERM)
+        assert typist.reads("Written: ")
+        os.close(typist.master)
+    else:
+        os.close(typist.master)
+        if how == "hung up":
+            typist.process.send_signal(signal.SIGHUP)
+    # Where it was, nobody reads the summary any more.
+    assert typist.process.wait(timeout=60) in ((0,) if how == "ended" else (0, 2))
+    assert contents(place) == {"map.txt", "run.mcap"}
+    _, commands = read_drive("run.mcap")
+    assert (0.8, 0.0) in [(round(c.v, 3), round(c.w, 3)) for _, c in commands]
 
 
 def test_the_terminal_is_as_before_when_the_drive_fails(place: Path) -> None:

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import gzip
+import os
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -137,3 +141,22 @@ def test_what_was_passed_over_is_said(log: Path, tmp_path: Path) -> None:
     done = run("slam", cut, "-o", tmp_path / "out", *QUICK)
     assert done.code == 0
     assert done.line == f"mapmeld: note: {cut}: a last line that is cut off"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
+@pytest.mark.parametrize("ending", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_an_interruption_is_one_line_and_leaves_nothing(tmp_path: Path, ending: str) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "mapmeld", "slam", LOG, "-o", "out",
+         "--set", "particles=60", "--set", "linearUpdate=0.1"],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    deadline = time.monotonic() + 120
+    while not list(tmp_path.iterdir()) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(0.5)  # almost all of the time from here on is spent in compiled code
+    process.send_signal(getattr(signal, ending))
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert err == "mapmeld: interrupted, nothing more is written\n"
+    assert list(tmp_path.iterdir()) == []

@@ -107,6 +107,32 @@ def test_the_robot_must_fit() -> None:
     assert narrow.reachable_map == narrow.reachable_truth < 60
 
 
+@pytest.mark.parametrize("radius", [0.0, 0.05, 0.07, 0.1, 0.3])
+def test_a_diagonal_wall_is_a_wall(radius: float) -> None:
+    cells = np.zeros((60, 60), np.int8)
+    open_floor = OccupancyGrid(cells.copy(), 0.05)
+    cells[np.arange(60), np.arange(60)] = 100
+    walled = OccupancyGrid(cells, 0.05)
+    found = reach(walled, radius=radius, pairs=100)
+    assert found.components == 2
+    assert 30 < found.reachable < 70
+    compared = navigability(walled, walled, Pose2(), radius=radius, pairs=100)
+    assert 30 < compared.reachable_both == compared.reachable_map < 70
+    assert (compared.false_passages, compared.false_blocks) == (0, 0)
+    # Planned across it, a way is false.
+    crossed = navigability(open_floor, walled, Pose2(), radius=radius, tolerance=0.05, pairs=100)
+    assert crossed.reachable_map == 100
+    assert crossed.false_passages >= 100 - crossed.reachable_truth > 30
+
+
+def test_thin_robots_are_compared_by_the_same_kind_of_steps() -> None:
+    fine = built(4, 4, around(4, 4))
+    coarse = built(4, 4, around(4, 4), resolution=0.2)
+    found = navigability(fine, coarse, Pose2(), radius=0.2, pairs=40)
+    assert found.pairs == len(found.length_ratios) == 40
+    assert min(found.length_ratios) > 0.9
+
+
 def test_what_is_unknown_is_not_driven() -> None:
     picture = "......\n... ..\n......"
     with_hole = drawn(picture.replace(".. ", "   ").replace("......", "...   "))

@@ -81,9 +81,9 @@ def test_packed_logs_are_read_whatever_they_are_called(tmp_path: Path) -> None:
 
 def test_what_does_not_fit_is_passed_over_and_counted(tmp_path: Path) -> None:
     other = "FLASER 2 1.0 1.0 0 0 0 0 0 0 3.0 host 3.0\n"
-    log = FLASER.format(time=2.0) + FLASER.format(time=1.0) + other + FLASER.format(time=4.0)
+    log = "".join(FLASER.format(time=time) for time in (1.5, 2.0, 1.0)) + other + FLASER.format(time=4.0)
     stream = carmen_scans(written(tmp_path, log + "FLASER 3 1.0 2."))
-    assert [scan.stamp for scan in stream.scans] == [2.0, 4.0]
+    assert [scan.stamp for scan in stream.scans] == [1.5, 2.0, 4.0]
     assert stream.left_out == {
         "a scan that is older than the one before it": 1,
         "a scan that has not 3 beams, as the first one has": 1,
@@ -153,3 +153,12 @@ def test_garbled_logs_raise_nothing_but_one_line(
         problem, stamps = str(error), []
     assert "\n" not in problem
     assert all(map(math.isfinite, stamps))
+
+
+@pytest.mark.parametrize("wrong", [0, 1, 3])
+def test_one_wrong_time_does_not_cost_the_rest(tmp_path: Path, wrong: int) -> None:
+    times = [1.0, 2.0, 3.0, 4.0, 5.0]
+    text = "".join(FLASER.format(time=9e9 if n == wrong else time) for n, time in enumerate(times))
+    stream = carmen_scans(written(tmp_path, text))
+    assert [scan.stamp for scan in stream.scans] == times[:wrong] + times[wrong + 1 :]
+    assert stream.left_out == {"a scan with a time stamp later than that of the next one": 1}

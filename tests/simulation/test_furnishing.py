@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from small import two_rooms
 
-from mapmeld.simulation import Configuration, Environment, Kind, Settings, furnish, generate
+from mapmeld.simulation import Configuration, Environment, FloorPlan, Kind, Settings, furnish, generate
 from mapmeld.simulation.fields import rooms_of
 from mapmeld.simulation.furnishing import PASSAGE
 from mapmeld.simulation.true_map import covered
@@ -29,6 +29,14 @@ def test_a_robot_still_gets_into_every_room(furnished: Environment) -> None:
         if (part := parts[10:-10, 10:-10][np.kron(inside == number, np.ones((20, 20), bool))]).any()
     }
     assert len(found) == 1
+
+
+@pytest.mark.parametrize("seed", [*range(4), 19, 139, 148])  # the last ones: a table before the only door
+def test_no_room_of_the_usual_environments_is_cut_off(seed: int) -> None:
+    environment = generate(Settings(), seed)
+    plan = FloorPlan(environment)
+    reached = set(plan.room_at(plan.planner.main_floor()).tolist()) - {0}
+    assert reached == set(range(1, int(plan.rooms.max()) + 1))
 
 
 def test_pieces_stand_in_rooms_and_not_in_one_another(furnished: Environment) -> None:

@@ -21,6 +21,7 @@ from mapmeld.slam import (
     states,
     write_trajectory,
 )
+from mapmeld.slam.history import second_of
 
 QUICK = GMappingParameters(particles=6, linearUpdate=0.2, angularUpdate=0.2, delta=0.05)
 
@@ -229,3 +230,11 @@ def test_the_trajectory_is_written_as_evo_reads_it(tmp_path: Any) -> None:
     np.testing.assert_allclose(rows[:, :3], np.column_stack([found.stamps, found.poses[:, :2]]), atol=1e-6)
     np.testing.assert_allclose(2 * np.arctan2(rows[:, 6], rows[:, 7]), found.poses[:, 2], atol=1e-6)
     assert not rows[:, 3:6].any()
+
+
+@pytest.mark.parametrize("start", [0.0, 1700000000.1, 1700000000.7])
+def test_seconds_do_not_lose_states_to_rounding(start: float) -> None:
+    # Scans at 10 Hz: every tenth begins a second, however its stamp is rounded.
+    for every, per_second in ((1.0, 10), (0.1, 1), (0.5, 5)):
+        seconds = [second_of(start + n / 10, start, every) for n in range(500)]
+        assert seconds == [n // per_second for n in range(500)]

@@ -5,10 +5,15 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import signal
 import sys
 import traceback
+from types import FrameType
 
 from mapmeld.cli.errors import BAD_INPUT, FAULT, INTERRUPTED, say, silence
+
+# Who ends a process, or closes its terminal, wants no half-written files left behind either.
+_ENDINGS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 def run_process() -> None:
@@ -28,6 +33,9 @@ def run_process() -> None:
         if isinstance(stream, io.TextIOWrapper):
             with contextlib.suppress(ValueError):
                 stream.reconfigure(errors="backslashreplace")
+    for number in _ENDINGS:
+        if signal.getsignal(number) is signal.SIG_DFL:  # nohup has others ignored
+            signal.signal(number, _interrupt)
     try:
         from mapmeld.cli.commands import app
 
@@ -46,3 +54,10 @@ def run_process() -> None:
         except OSError:
             silence(stream)
     sys.exit(code)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """Let an ending be an interruption; a second one shall not disturb the tidying up."""
+    for ending in _ENDINGS:
+        signal.signal(ending, signal.SIG_IGN)
+    raise KeyboardInterrupt

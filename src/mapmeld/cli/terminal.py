@@ -6,11 +6,12 @@ import math
 import os
 import select
 import shutil
+import signal
 import sys
 import termios
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from mapmeld.errors import MapmeldError
@@ -32,6 +33,8 @@ class TerminalError(MapmeldError):
 def single_keys() -> Iterator[Keys]:
     """Read keys one by one, Ctrl-C among them, until the block ends.
 
+    Who closes the terminal, or ends the process, presses Ctrl-C: what was done so far is not lost.
+
     Raises
     ------
     TerminalError
@@ -43,11 +46,18 @@ def single_keys() -> Iterator[Keys]:
     before = termios.tcgetattr(descriptor)
     changed = termios.tcgetattr(descriptor)
     changed[3] &= ~(termios.ICANON | termios.ECHO | termios.ISIG)
+    keys = Keys(descriptor)
+    handlers = {
+        number: signal.signal(number, lambda *_: keys.end()) for number in (signal.SIGHUP, signal.SIGTERM)
+    }
     try:
         termios.tcsetattr(descriptor, termios.TCSADRAIN, changed)
-        yield Keys(descriptor)
+        yield keys
     finally:
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        with suppress(termios.error):  # the terminal is gone
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
 
 
 class Keys:
@@ -55,12 +65,22 @@ class Keys:
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
+        self._ended = False
+
+    def end(self) -> None:
+        """Let Ctrl-C be pressed."""
+        self._ended = True
 
     def pressed(self) -> str:
         """Return the keys pressed since the last call, without waiting; Ctrl-C if the terminal is gone."""
+        if self._ended:
+            return "\x03"
         if not select.select([self._descriptor], [], [], 0)[0]:
             return ""
-        data = os.read(self._descriptor, 1024)
+        try:
+            data = os.read(self._descriptor, 1024)
+        except OSError:
+            data = b""
         return data.decode("utf-8", "replace") or "\x03"
 
 
@@ -81,8 +101,9 @@ class Screen:
         words = [*self._help.splitlines(), status[: columns - 1]]
         picture = plan_around(self._plan, pose, columns - 1, max(3, lines - len(words) - 1))
         text = "".join(f"{line}{_CLEAR_LINE}\r\n" for line in (*picture, *words))
-        sys.stdout.write(_HOME + text + _CLEAR_BELOW)
-        sys.stdout.flush()
+        with suppress(OSError):  # the terminal is gone; the drive ends with the next look at the keys
+            sys.stdout.write(_HOME + text + _CLEAR_BELOW)
+            sys.stdout.flush()
 
 
 def plan_around(plan: OccupancyGrid, pose: Pose2, columns: int, lines: int) -> list[str]:

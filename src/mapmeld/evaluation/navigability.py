@@ -1,7 +1,8 @@
 """What a round robot can drive on a map, and what of that is true: the question that the paper left open.
 
 Ways are planned as a robot would: the shortest on the map, its obstacles grown by the robot's radius, on
-floor that is known to be free (Dijkstra on 8 neighbours, scikit-image's MCP_Geometric). What truth allows is
+floor that is known to be free (Dijkstra on 8 neighbours, scikit-image's MCP_Geometric; on 4 where a robot
+is as thin as a cell, which could slip between the cells of a diagonal wall). What truth allows is
 asked on the same lattice, so neither half a cell between two maps nor the turn of one against the other shows
 as a difference of lengths.
 """
@@ -10,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from statistics import median
 
@@ -27,6 +28,7 @@ from mapmeld.se2 import Pose2
 MAX_CELLS = 50_000_000
 
 _GOALS_PER_START = 10  # one search from a start finds the ways to all its goals
+_THIN = 1.5  # radius [cells] below which a diagonal step might cross a wall of cells that meet at corners
 _TOUCH = 1e-6  # of a cell: who only touches an obstacle does not hit it
 
 
@@ -254,6 +256,7 @@ def navigability(
     common = _reaching(_checked(grid, radius), truth, T_truth_grid)
     floor = _Floor.of(common, radius)
     true_floor = _sampled(_Floor.of(truth, radius), common, T_truth_grid)
+    floor = replace(floor, diagonals=true_floor.diagonals)  # lengths are of one kind
     drawn_from = floor.drivable & true_floor.drivable
     if starts is not None:
         drawn_from &= np.isin(true_floor.labels, _labels_at(true_floor, starts))
@@ -292,6 +295,7 @@ class _Floor:
     radius: float
     clearance: NDArray[np.float64]  # from cell centre to the nearest obstacle's [m]; inf without obstacles
     drivable: Mask
+    diagonals: bool  # whether steps go to all 8 neighbours
 
     @classmethod
     def of(cls, grid: OccupancyGrid, radius: float) -> _Floor:
@@ -300,7 +304,8 @@ class _Floor:
         else:
             # Between centres: where in its cell a wall was met is not known, the middle is the fair guess.
             clearance = distance_transform_edt(~grid.occupied) * grid.resolution
-        return cls(grid, radius, clearance, cls._wide(grid.free, clearance, grid, radius))
+        drivable = cls._wide(grid.free, clearance, grid, radius)
+        return cls(grid, radius, clearance, drivable, radius >= _THIN * grid.resolution)
 
     @staticmethod
     def _wide(free: Mask, clearance: NDArray[np.float64], grid: OccupancyGrid, radius: float) -> Mask:
@@ -310,7 +315,11 @@ class _Floor:
     @cached_property
     def labels(self) -> NDArray[np.int32]:
         """The number of each cell's part of the floor, from 1; 0 where it cannot be driven."""
-        _, labels = cv2.connectedComponents(self.drivable.astype(np.uint8), connectivity=8)
+        return self.parts(self.drivable)
+
+    def parts(self, mask: Mask) -> NDArray[np.int32]:
+        """Return the number of the part of a mask to which each cell belongs, from 1; 0 beyond the mask."""
+        _, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8 if self.diagonals else 4)
         return np.asarray(labels, np.int32)
 
 
@@ -356,7 +365,8 @@ def _sampled(floor: _Floor, lattice: OccupancyGrid, T_floor_lattice: Pose2) -> _
             room = map_coordinates(floor.clearance, (at[inside] - 0.5).T[::-1], order=1, mode="nearest")
         clearance[row, inside] = room
         drivable[row, inside] = floor._wide(free, room, floor.grid, floor.radius)
-    return _Floor(lattice, floor.radius, clearance, drivable)
+    diagonals = floor.diagonals and floor.radius >= _THIN * lattice.resolution
+    return _Floor(lattice, floor.radius, clearance, drivable, diagonals)
 
 
 def _labels_at(floor: _Floor, starts: Sequence[Pose2]) -> list[int]:
@@ -416,7 +426,8 @@ class _Plans:
             return
         # Only the part in which the start lies; -1 is no way for MCP.
         costs = np.where(labels == labels[start], 1.0, -1.0)
-        self._search = required("skimage.graph", "navigation").MCP_Geometric(costs, fully_connected=True)
+        searches = required("skimage.graph", "navigation")
+        self._search = searches.MCP_Geometric(costs, fully_connected=floor.diagonals)
         self._costs, _ = self._search.find_costs([start], sorted(self._reached))
 
     def length(self, goal: Cell) -> float | None:
@@ -445,6 +456,6 @@ def _can_follow(floor: _Floor, path: NDArray[np.int64], tolerance: float) -> boo
         found: Mask = cv2.distanceTransform(off, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= within
         return found
 
-    _, parts = cv2.connectedComponents((floor_here & near(at)).astype(np.uint8), connectivity=8)
+    parts = floor.parts(floor_here & near(at))
     begun, ended = parts[near(at[:1])], parts[near(at[-1:])]
     return bool(np.intersect1d(begun[begun > 0], ended[ended > 0]).size)

@@ -16,6 +16,7 @@ import numpy as np
 
 from mapmeld.io import AnyPath
 from mapmeld.io.images import open_regular
+from mapmeld.io.in_order import InOrder
 from mapmeld.io.scan_stream import ScanFileError, ScanStream
 from mapmeld.recording import Laser, Scan
 from mapmeld.se2 import Pose2
@@ -88,15 +89,18 @@ def _scans(
     lines: Iterator[tuple[str, _Line, dict[str, float]]],
     left_out: Counter[str],
 ) -> Iterator[Scan]:
-    latest = -math.inf
+    in_order = InOrder[_Line]("a scan", left_out, repeats=True)
     for line in itertools.chain([first], (line for _, line, _ in lines)):
         if len(line.ranges) != laser.beams:
             left_out[f"a scan that has not {laser.beams} beams, as the first one has"] += 1
-        elif line.stamp < latest:
-            left_out["a scan that is older than the one before it"] += 1
         else:
-            latest = line.stamp
-            yield Scan(line.stamp, line.T_odom_base, np.array(line.ranges, np.float32))
+            yield from map(_scan, in_order.add(line.stamp, line))
+    yield from map(_scan, in_order.rest())
+
+
+def _scan(stamped: tuple[float, _Line]) -> Scan:
+    stamp, line = stamped
+    return Scan(stamp, line.T_odom_base, np.array(line.ranges, np.float32))
 
 
 def _scan_lines(name: str, left_out: Counter[str]) -> Iterator[tuple[str, _Line, dict[str, float]]]:

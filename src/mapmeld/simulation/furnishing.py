@@ -19,6 +19,7 @@ from mapmeld.simulation.true_map import cover
 PASSAGE = 0.6
 """Width [m] of the ways that stay free."""
 
+_NARROWEST = 0.55  # [m] a way to a door; less than PASSAGE, as cells round obstacles up
 _CELLS = 20  # of the working lattice in a metre
 _GAP = 0.03  # between two pieces, and to the walls [m]
 _DOOR_ZONE = 0.9  # radius around a door where nothing stands [m]
@@ -81,6 +82,7 @@ class _Room:
             row, col, half = int(y * _CELLS), int(x * _CELLS), _CELLS // 2
             self.blocked[max(0, row - half) : row + half + 1, max(0, col - half) : col + half + 1] = False
         self.pieces: list[Furniture] = []
+        self.joined = self._joined_doors(self.blocked)
 
     def _here(self, boxes: Iterable[Box]) -> list[Box]:
         return [replace(box, x=box.x - self.corner[0], y=box.y - self.corner[1]) for box in boxes]
@@ -125,10 +127,23 @@ class _Room:
         )
         if not mask.any() or (mask & taken).any() or not _passable(blocked, blocked | mask):
             return False
+        # What looks like a pocket there may be the way to a door.
+        with_piece = self.blocked.copy()
+        with_piece[window] |= mask
+        if not self.joined <= self._joined_doors(with_piece):
+            return False
         blocked |= mask
         taken |= mask
         self.pieces.append(piece)
         return True
+
+    def _joined_doors(self, blocked: Mask) -> set[int]:
+        """Return which of the doors lead to the largest part of the floor that hangs together."""
+        _, parts, statistics, _ = cv2.connectedComponentsWithStats(_wide(blocked, _NARROWEST), connectivity=4)
+        areas = statistics[1:, cv2.CC_STAT_AREA]
+        largest = 1 + int(areas.argmax()) if len(areas) else -1
+        cells = [np.floor((centre - self.corner) * _CELLS).astype(int) for centre in self.doors]
+        return {number for number, (col, row) in enumerate(cells) if parts[row, col] == largest}
 
     def _around(self, box: Box) -> tuple[slice, slice]:
         reach_x, reach_y = (reach + _SURROUNDINGS for reach in box.reach())
@@ -193,8 +208,8 @@ def _passable(before: Mask, after: Mask) -> bool:
     return True
 
 
-def _wide(blocked: Mask) -> NDArray[np.uint8]:
+def _wide(blocked: Mask, passage: float = PASSAGE) -> NDArray[np.uint8]:
     """Return where the middle of something of the width of a passage can be, as 0 and 1."""
     clearance = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, 5)
-    wide: NDArray[np.uint8] = (clearance > PASSAGE / 2 * _CELLS).astype(np.uint8)
+    wide: NDArray[np.uint8] = (clearance > passage / 2 * _CELLS).astype(np.uint8)
     return wide

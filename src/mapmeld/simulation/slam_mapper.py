@@ -11,8 +11,7 @@ from mapmeld.recording import Laser, Scan
 from mapmeld.se2 import Pose2
 from mapmeld.simulation.driving import Command, Driver, Sight
 from mapmeld.slam import GMapping, GMappingParameters
-
-_SECOND = 1.0  # a state of the map for each in which it changed, as the paper stores them
+from mapmeld.slam.history import second_of
 
 
 def onboard_parameters(laser: Laser) -> GMappingParameters:
@@ -56,7 +55,7 @@ class SlamMapper:
     def add(self, scan: Scan, T_world_base: Pose2) -> None:
         """Take in a scan with its odometry."""
         self._start = scan.stamp if self._start is None else self._start
-        second = math.floor((scan.stamp - self._start) / _SECOND + 1e-6)
+        second = second_of(scan.stamp, self._start)
         if self._changed_in is not None and second > self._changed_in:
             self.finish()
         if self.slam.add(scan):

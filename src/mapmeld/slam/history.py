@@ -10,6 +10,13 @@ from mapmeld.recording import Laser, Scan
 from mapmeld.slam.gmapping import GMapping
 from mapmeld.slam.parameters import GMappingParameters
 
+_ROUNDING = 1e-6  # [s] that stamps may lack; counted from 1970, they cannot say less either
+
+
+def second_of(stamp: float, start: float, every: float = 1.0) -> int:
+    """Return in which second of the length `every` [s] after `start` a stamp lies, from 0."""
+    return math.floor((stamp - start + _ROUNDING) / every)
+
 
 def map_history(
     laser: Laser,
@@ -48,7 +55,7 @@ def states(slam: GMapping, scans: Iterable[Scan], every: float = 1.0) -> Iterato
     changed_in: int | None = None
     for scan in scans:
         start = scan.stamp if start is None else start
-        second = math.floor((scan.stamp - start) / every)
+        second = second_of(scan.stamp, start, every)
         if changed_in is not None and second > changed_in and slam.has_map:
             yield slam.map()
             changed_in = None

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmeld.slam.compiled import compiled
+from mapmeld.slam.interruptible import interruptible
 
 Floats = NDArray[np.float64]
 Cells = NDArray[np.float32]
@@ -124,6 +125,7 @@ def evaluate(
     return score, likelihood
 
 
+@interruptible
 @compiled
 def climb(
     cells: Cells,
@@ -177,6 +179,7 @@ def climb(
     return scores, likelihoods
 
 
+@interruptible
 @compiled
 def likelihoods_around(
     cells: Cells, walls: Bits, table: Ids, poses: Floats, ends: Floats, sensor: Sensor
@@ -188,6 +191,7 @@ def likelihoods_around(
     return found
 
 
+@interruptible
 @compiled
 def register(
     cells: Cells,

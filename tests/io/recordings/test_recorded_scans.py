@@ -214,6 +214,46 @@ def test_scans_of_other_sizes_are_brought_to_the_beams_of_the_first(tmp_path: Pa
     assert found == [[1, 2, 3], [1, 2, 3], [0, 2, 3], [0, 0, 0]]
 
 
+def test_scans_that_begin_elsewhere_are_turned_to_the_beams_of_the_first(tmp_path: Path) -> None:
+    words = Words(2)
+    sent = [one for one in usual(words) if one[1] != "/scan"]
+    quarter = {"angle_increment": math.pi / 2}
+    for n, start in enumerate((-math.pi, -math.pi / 2, 0.0, -math.pi + 0.1, math.pi)):
+        scan = words.scan(0.2 + 0.1 * n, [1.0, 2.0, 3.0, 4.0], angle_min=start, **quarter)
+        sent.append((0.2 + 0.1 * n, "/scan", SCAN, scan))
+    found = [scan.ranges.tolist() for scan in opened(tmp_path, sent).scans]
+    assert found == [[1, 2, 3, 4], [4, 1, 2, 3], [3, 4, 1, 2], [1, 2, 3, 4], [1, 2, 3, 4]]
+    sent = [one for one in usual(words) if one[1] != "/scan"]
+    sent.append((0.2, "/scan", SCAN, words.scan(0.2, [1.0, 2.0, 3.0])))
+    sent.append((0.3, "/scan", SCAN, words.scan(0.3, [1.0, 2.0, 3.0], angle_min=0.0)))
+    assert [s.ranges.tolist() for s in opened(tmp_path, sent).scans] == [[1, 2, 3], [0, 1, 2]]
+
+
+def unnamed(words: Words) -> list[Sent]:
+    sent = [one for one in usual(words) if one[1] != "/odom"]
+    for n in range(11):
+        odometry = words.odometry(0.1 * n, Pose2(0.1 * n, 1.0, 0.0), child="")
+        sent.append((0.1 * n + 0.01, "/odom", ODOMETRY, odometry))
+    return sent
+
+
+def test_odometry_that_does_not_name_the_robot_is_that_of_the_frame_on_tf(tmp_path: Path) -> None:
+    words = Words(2)
+    sent = unnamed(words)
+    sent.append((0.3, "/tf", TF, words.frames((0.3, "odom", "base_link", Pose2()))))
+    stream = opened(tmp_path, sent)
+    assert stream.laser.T_base_laser.distance_to(Pose2(0.2, 0.0, math.pi / 2)) == pytest.approx((0, 0))
+    assert len(list(stream.scans)) == 9
+    assert not stream.left_out
+
+
+@pytest.mark.parametrize("with_tf", [True, False])
+def test_odometry_that_does_not_name_the_robot_is_refused_without(tmp_path: Path, with_tf: bool) -> None:
+    sent = [one for one in unnamed(Words(2)) if with_tf or one[1] != "/tf_static"]
+    with pytest.raises(RecordingError, match="/odom does not name the robot's frame"):
+        opened(tmp_path, sent)
+
+
 def test_what_cannot_be_used_is_counted(tmp_path: Path) -> None:
     words = Words(2)
     sent = [one for one in usual(words) if one[1] != "/tf_static"]
@@ -228,6 +268,20 @@ def test_what_cannot_be_used_is_counted(tmp_path: Path) -> None:
         "where frame 'laser' sits on 'base_link' is not in the recording: "
         "the laser is taken to be in the middle of the robot",
     ]
+
+
+@pytest.mark.parametrize("topic", ["/scan", "/odom"])
+def test_one_wrong_time_does_not_cost_the_rest(tmp_path: Path, topic: str) -> None:
+    words = Words(2)
+    sent = usual(words)
+    number = next(n for n, one in enumerate(sent) if one[1] == topic and one[0] > 0.3)
+    kind, message = sent[number][2:]
+    message.header = words.header(1e5, message.header.frame_id)
+    sent[number] = (sent[number][0], topic, kind, message)
+    stream = opened(tmp_path, sent)
+    assert len(list(stream.scans)) == (8 if topic == "/scan" else 9)
+    what = "a scan" if topic == "/scan" else "odometry"
+    assert stream.left_out == {f"{what} with a time stamp later than that of the next one": 1}
 
 
 def test_stamps_of_zero_mean_when_they_were_received(tmp_path: Path) -> None:

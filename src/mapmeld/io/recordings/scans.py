@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapmeld.io import AnyPath
+from mapmeld.io.in_order import InOrder
 from mapmeld.io.odometry import OdometryTrack
 from mapmeld.io.recordings.frames import Frames, frame_name, level_pose, matrix_of
 from mapmeld.io.recordings.messages import (
@@ -27,7 +28,7 @@ from mapmeld.io.recordings.opening import open_recording
 from mapmeld.io.recordings.source import Channel, Message, Source
 from mapmeld.io.scan_stream import ScanStream
 from mapmeld.recording import Laser, Scan
-from mapmeld.se2 import Pose2
+from mapmeld.se2 import Pose2, wrap_angle
 
 SCAN = "sensor_msgs/msg/LaserScan"
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -121,6 +122,7 @@ def _look_ahead(
     frames = Frames()
     first: Any = None
     base: str | None = None
+    parent: str | None = ODOM_FRAME if odometry[0].type in TF else None
     seen = 0
     with_frames = [c for c in source.channels if c.type in TF and c.encoding in ENCODINGS]
     for message in source.messages({*scans, *odometry, *with_frames}):
@@ -129,14 +131,17 @@ def _look_ahead(
         if kind == SCAN:
             first = first or content
         elif kind == ODOMETRY:
-            base = base or frame_name(content.child_frame_id)
+            # Some drivers leave their own frame out; tf may say it.
+            base = base or frame_name(content.child_frame_id) or None
+            parent = frame_name(content.header.frame_id)
         else:
             frames.add(content)
             seen += 1
-        if odometry[0].type in TF:
-            base = frames.child(ODOM_FRAME)
+        if parent and (base is None or odometry[0].type in TF):
+            base = frames.child(parent)
         if first is None or base is None:
-            if seen > _ENOUGH_FRAMES and first is not None:
+            hopeless = seen > _ENOUGH_FRAMES or (parent is not None and not with_frames)
+            if hopeless and first is not None:
                 break
             continue
         mounted = frames.between(base, frame_name(first.header.frame_id)) is not None
@@ -145,6 +150,12 @@ def _look_ahead(
     if first is None:
         raise RecordingError.of(name, f"there is no scan on {scans[0].topic}")
     if base is None:
+        if odometry[0].type not in TF and parent is not None:
+            raise RecordingError.of(
+                name,
+                f"{odometry[0].topic} does not name the robot's frame (child_frame_id is empty), and no "
+                f"frame has its place in {parent!r} on tf, so where the laser sits cannot be known",
+            )
         problem = (
             f"no frame has its place in frame {ODOM_FRAME!r}" if odometry[0].type in TF else "no message"
         )
@@ -191,24 +202,25 @@ def _scans(
     """Give the scans as soon as the odometry after them is known."""
     track = OdometryTrack()
     waiting: deque[tuple[float, NDArray[np.float32]]] = deque()
-    latest = -math.inf
+    scans_in_order = InOrder[NDArray[np.float32]]("a scan", left_out)
+    poses_in_order = InOrder[Pose2]("odometry", left_out, repeats=True)
     with open_recording(name, "refuse") as source:
         for message in source.messages({*scans, *odometry}):
             content = _content(name, message)
             if message.channel.type == SCAN:
                 stamp = stamp_of(content.header, message.received)
-                if stamp <= latest:
-                    left_out["a scan that is no later than the one before it"] += 1
-                    continue
-                latest = stamp
-                waiting.append((stamp, _ranges(content, mount)))
+                waiting += scans_in_order.add(stamp, _ranges(content, mount))
             else:
                 for stamp, pose in _poses(name, content, message, base):
-                    track.add(stamp, pose)
+                    for placed in poses_in_order.add(stamp, pose):
+                        track.add(*placed)
             while waiting and (
                 (track.latest is not None and track.latest >= waiting[0][0]) or len(waiting) > _MOST_WAITING
             ):
                 yield from _placed(*waiting.popleft(), track, left_out)
+    waiting += scans_in_order.rest()
+    for placed in poses_in_order.rest():
+        track.add(*placed)
     for stamp, ranges in waiting:
         yield from _placed(stamp, ranges, track, left_out)
 
@@ -235,11 +247,17 @@ def _ranges(content: Any, mount: _Mount) -> NDArray[np.float32]:
     # Some lasers, driven by a motor of their own speed, send another number of beams each time.
     start, step = float(content.angle_min), float(content.angle_increment)
     sign = 1.0 if laser.step * step > 0 else -1.0
-    if len(ranges) == laser.beams and math.isclose(sign * step, laser.step, rel_tol=1e-3):
+    turned = wrap_angle(sign * start - laser.first_angle) if math.isfinite(start) else math.inf
+    same_step = math.isclose(sign * step, laser.step, rel_tol=1e-3)
+    if len(ranges) == laser.beams and same_step and abs(turned) < abs(step) / 2:
         return ranges
     taken = np.zeros(laser.beams, np.float32)
-    if step and math.isfinite(step) and len(ranges):
+    if step and math.isfinite(step) and math.isfinite(turned) and len(ranges):
         index = np.rint((sign * laser.bearings() - start) / step).astype(np.int64)
+        # A whole turn further, a beam that looks around is the same.
+        whole = round(math.tau / abs(step))
+        index[index < 0] += whole
+        index[index >= len(ranges)] -= whole
         there = (index >= 0) & (index < len(ranges))
         taken[there] = ranges[index[there]]
     return taken
