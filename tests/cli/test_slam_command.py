@@ -71,6 +71,10 @@ def test_force_replaces_what_an_earlier_run_wrote_and_nothing_else(log: Path, tm
     assert "is not empty" in refused.line
     assert run("slam", log, "-o", out, "--force", *QUICK).code == 0
     assert files(out) == ["history/notes.md", "map.pgm", "map.yaml", "mine.txt", "trajectory.txt"]
+    (out / "history" / "notes.md").unlink()
+    assert run("slam", log, "-o", out, "--force", "--history", *QUICK).code == 0
+    assert run("slam", log, "-o", out, "--force", *QUICK).code == 0
+    assert not (out / "history").exists()
 
 
 def test_files_of_the_node_and_single_settings(log: Path, tmp_path: Path) -> None:

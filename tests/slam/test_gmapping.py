@@ -11,7 +11,7 @@ import pytest
 from worlds import LASER, ROOM, drive, pose_rms, ranges_from
 
 from mapmeld.recording import Laser, Scan
-from mapmeld.se2 import Pose2
+from mapmeld.se2 import Pose2, wrap_angle
 from mapmeld.slam import (
     GMapping,
     GMappingParameters,
@@ -190,6 +190,29 @@ def test_odometry_that_jumps_out_of_the_world_is_refused() -> None:
     slam.add(Scan(0.0, Pose2(), ranges))
     with pytest.raises(MapTooLargeError, match="the odometry jumps"):
         slam.add(Scan(1.0, Pose2(1e9, 0.0, 0.0), ranges))
+
+
+def test_odometry_that_begins_far_away_needs_the_map_to_be_there() -> None:
+    scan = Scan(0.0, Pose2(5e5, 5e6), np.full(LASER.beams, 2.0, np.float32))
+    with pytest.raises(MapTooLargeError, match="set xmin, ymin, xmax and ymax"):
+        GMapping(LASER, QUICK).add(scan)
+    there = replace(QUICK, xmin=499_990.0, ymin=4_999_990.0, xmax=500_010.0, ymax=5_000_010.0)
+    slam = GMapping(LASER, there)
+    assert slam.add(scan)
+    assert slam.map().origin.x == pytest.approx(5e5, abs=5.0)
+
+
+@pytest.mark.parametrize("proposal", ["matched", "sampled"])
+def test_more_than_half_a_turn_between_two_scans(proposal: Any) -> None:
+    parameters = replace(QUICK, proposal=proposal, linearUpdate=100.0, angularUpdate=4.0, stt=0.02, srt=0.02)
+    slam, (_, true, used) = mapped(parameters)
+    found = slam.trajectory().poses
+    assert len(found) == 2
+    turned = (true[used][1] - true[used][0])[2]
+    assert turned > math.pi
+    assert abs(wrap_angle(found[1, 2] - found[0, 2] - turned)) < 0.15
+    # A whole turn away, the motion would be as good as impossible.
+    assert slam._totals.max() > -800
 
 
 # ---------------------------------------------------------------- history

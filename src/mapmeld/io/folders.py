@@ -6,7 +6,7 @@ import os
 import secrets
 import shutil
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mapmeld.errors import MapmeldError
@@ -50,8 +50,8 @@ def whole_folder(folder: Path, *, force: bool, ours: Collection[str]) -> Iterato
     force
         Write into a folder that is not empty.
     ours
-        Relative paths that earlier runs may have left; those not written anew are removed, so that
-        the folder never holds a mixture of two runs.
+        Relative paths that earlier runs may have left; those not written anew are removed, and folders
+        that are empty then, so that the folder never holds a mixture of two runs.
 
     Raises
     ------
@@ -107,3 +107,6 @@ def _move_into(temporary: Path, folder: Path, force: bool, ours: Collection[str]
         (temporary / path).replace(folder / path)
     for stale in {Path(name) for name in ours} - set(written):
         (folder / stale).unlink(missing_ok=True)
+        for parent in list(stale.parents)[:-1]:  # without `folder` itself
+            with suppress(OSError):  # something else lies in it
+                (folder / parent).rmdir()

@@ -1,4 +1,4 @@
-"""Exploration of the nearest frontiers between known and unknown floor (Yamauchi 1997)."""
+"""Exploration of the frontiers between known and unknown floor (Yamauchi 1997): near and large ones first."""
 
 from __future__ import annotations
 
@@ -38,7 +38,9 @@ class Mapper(Protocol):
 
 
 class FrontierDriver:
-    """Drives to the nearest frontier until there is none left that it can reach.
+    """Drives to frontiers, the nearest first, until there is none left that it can reach.
+
+    A large frontier counts as nearer than it is.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ the program that its authors released. docs/slam.md says where the two differ.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,6 +106,7 @@ class GMapping:
         self._weights = np.zeros(p.particles)  # logarithms, since the last resampling
         self._totals = np.zeros(p.particles)  # logarithms, over the whole past of a particle
         self._linear = self._angular = 0.0
+        self._turned = 0.0  # since the last scan that was used, which may be more than a Pose2 tells
         self._odometry: Pose2 | None = None  # at the last scan
         # At the last scan that was used:
         self._used_odometry = Pose2()
@@ -146,6 +147,7 @@ class GMapping:
             self._poses = sample_motion(self._poses, motion, p, self._rng)
             self._linear += math.hypot(motion.x, motion.y)
             self._angular += abs(motion.theta)
+            self._turned += motion.theta
         self._odometry = now
         waited = p.temporalUpdate >= 0 and scan.stamp - self._used_stamp > p.temporalUpdate
         if not (first or waited or self._linear >= p.linearUpdate or self._angular >= p.angularUpdate):
@@ -173,7 +175,7 @@ class GMapping:
         self._past_poses.append(self._poses.copy())
         self._parents.append(parents)
         self._used_odometry, self._used_stamp = now, scan.stamp
-        self._linear = self._angular = 0.0
+        self._linear = self._angular = self._turned = 0.0
         return True
 
     def _beams(self, scan: Scan) -> _Beams:
@@ -235,7 +237,7 @@ class GMapping:
         """
         p = self.parameters
         assert self._odometry is not None
-        motion = self._used_odometry.inverse() @ self._odometry
+        motion = replace(self._used_odometry.inverse() @ self._odometry, theta=self._turned)
         expected = moved(self._past_poses[-1][number][None], np.array([motion.x, motion.y, motion.theta]))[0]
         # Odometry cannot be trusted to less than the distance of the samples.
         spread = np.maximum(motion_noise(motion, p), (p.llsamplestep, p.llsamplestep, p.lasamplestep))

@@ -91,6 +91,11 @@ class SharedMaps:
             max(bottom + rows, wanted[3]),
         )
         if max(new[2] - new[0], new[3] - new[1]) > MAX_SIDE:
+            if not self.tables.any() and max(wanted[2] - wanted[0], wanted[3] - wanted[1]) <= MAX_SIDE:
+                raise MapTooLargeError(
+                    f"odometry begins far from where the map is, between ({low[0]:.6g}, {low[1]:.6g}) and "
+                    f"({high[0]:.6g}, {high[1]:.6g}) m; set xmin, ymin, xmax and ymax to lie around it"
+                )
             raise MapTooLargeError(
                 f"the map would have to reach from ({low[0]:.6g}, {low[1]:.6g}) to "
                 f"({high[0]:.6g}, {high[1]:.6g}) m, more than {MAX_SIDE * PATCH} cells: the odometry jumps, "
