@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 import typer
 
 from mapmeld.cli.errors import NO_MATCH, say
-from mapmeld.cli.json_output import FOLLOW_SCHEMA, MATCH_SCHEMA
+from mapmeld.cli.schemas import FOLLOW_SCHEMA, MATCH_SCHEMA
 
 if TYPE_CHECKING:
     from mapmeld.grid import OccupancyGrid
