@@ -419,6 +419,7 @@ def _pair_fields(pair: PairMatch) -> Fields:
         "T_i_j": pose_fields(pair.T_i_j),
         "covariance": None if pair.covariance is None else pair.covariance.tolist(),
         "bridge": pair.bridge,
+        "against_known": pair.against_known,
         "off": None if pair.off is None else {"metres": pair.off[0], "radians": pair.off[1]},
         "match": _evidence(pair.result),
     }
