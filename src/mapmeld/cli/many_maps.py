@@ -1,4 +1,4 @@
-"""What the commands for many maps share: known poses and what speaks against them, and progress over pairs."""
+"""What the commands for many maps share: known poses, what speaks against them, progress over pairs."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def note_doubtful_poses(
     """Say on stderr which matches contradict known poses, and where walls do not support exact ones."""
     from mapmeld.cli.placement import note_if_unlikely
     from mapmeld.grid import overlap_share
-    from mapmeld.merging.graph import MUCH_OVERLAP, PairState
+    from mapmeld.merging.graph import MUCH_OVERLAP
 
     if not known:
         return
@@ -57,7 +57,7 @@ def note_doubtful_poses(
         say(f"note: {words} not agree with the known poses ({'; '.join(shown)}); they are used as given")
     for pair in pairs:
         one, other = (known.get(k) for k in (pair.i, pair.j))
-        if pair.state is not PairState.UNUSED or one is None or other is None:
+        if pair.against_known or one is None or other is None:
             continue
         if one.sigma_metres or one.sigma_theta or other.sigma_metres or other.sigma_theta:
             continue  # walls are finer than that

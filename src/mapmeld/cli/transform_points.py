@@ -107,6 +107,7 @@ def _check_usage(from_map: str | None, to_map: str | None, transform: str | None
 def _reader(points: Path, out: Path, to_map: str | None) -> Callable[[Pose2], tuple[str, dict[str, int]]]:
     """Read the points now, so that nothing is matched for a bad file; return what carries them over."""
     from mapmeld.changes import geojson, places
+    from mapmeld.cli.maps import names_of
     from mapmeld.io import MapFileError
     from mapmeld.io.plain_json import read_object
     from mapmeld.se2 import Pose2

@@ -211,7 +211,7 @@ def _judged(pair: PairMatch, found: Consistent, e: int, edges: Edges) -> PairMat
     if found.doubted[e]:
         why = "contradicted by matches that are about as probable together; none of them is used"
         if pair.against_known:
-            why = f"by the known poses {why}"
+            why = f"with the known poses as they are, {why}"
         return replace(pair, state=PairState.DOUBTED, why=why)
     them = "known poses" if pair.against_known else "other matches"
     return replace(pair, state=PairState.FALSE, why=f"contradicted by the {them}")
