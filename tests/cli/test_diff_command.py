@@ -102,7 +102,9 @@ def test_a_wrong_transform_is_carried_out_with_a_note(tmp_path: Path) -> None:
     a, b = write_maps(tmp_path, "a", "b")
     outcome = run("diff", a, b, "-o", tmp_path / "d", "--transform", "4,-3,50")
     assert outcome.code == 0
-    assert "note: the walls do not support --transform 4,-3,50 (probability" in outcome.line
+    assert (
+        "note: the walls of a.yaml and b.yaml do not support --transform 4,-3,50 (probability" in outcome.line
+    )
 
 
 def test_settings_are_heeded(tmp_path: Path) -> None:

@@ -111,7 +111,36 @@ def test_a_known_pose_that_a_match_contradicts(tmp_path: Path) -> None:
     poses = tmp_path / "poses.yaml"
     poses.write_text("a.yaml: {x: 0, y: 0, theta_deg: 0}\nb.yaml: {x: 9, y: 9, theta_deg: 0}\n")
     outcome = run("graph", *maps, "--known-poses", poses)
-    assert "false: a.yaml - b.yaml: contradicted" in outcome.out
+    assert "false: a.yaml - b.yaml: contradicted by the known poses" in outcome.out
+    assert outcome.code == 0
+    assert "note: an accepted match does not agree with the known poses (a.yaml - b.yaml: " in outcome.line
+    assert outcome.line.endswith("deg off); they are used as given")
+    merged = run("merge", *maps, "--known-poses", poses, "-o", tmp_path / "m.yaml")
+    assert merged.code == 0
+    assert merged.line == outcome.line
+    unmatched = run("merge", *maps, "--known-poses", poses, "--no-match", "-o", tmp_path / "n.yaml")
+    assert (unmatched.code, unmatched.err) == (0, "")
+
+
+def test_a_known_pose_that_the_walls_do_not_support(tmp_path: Path) -> None:
+    maps = write_maps(tmp_path, "a", "mirrored")
+    poses = tmp_path / "poses.yaml"
+    there = "a.yaml: {x: 0, y: 0, theta_deg: 0}\nmirrored.yaml: {x: 0, y: 0, theta_deg: 0"
+    poses.write_text(there + "}\n")
+    outcome = run("graph", *maps, "--known-poses", poses)
+    assert outcome.code == 0
+    assert "the walls of a.yaml and mirrored.yaml do not support their known poses (prob" in outcome.line
+    poses.write_text(there + ", sigma_m: 1, sigma_deg: 5}\n")  # nor need they
+    assert run("graph", *maps, "--known-poses", poses).err == ""
+
+
+def test_a_known_pose_that_is_right_needs_no_note(tmp_path: Path) -> None:
+    maps = write_maps(tmp_path, "a", "b")
+    poses = tmp_path / "poses.yaml"
+    b = f"{{x: {T_A_B.x}, y: {T_A_B.y}, theta_rad: {T_A_B.theta}}}"
+    poses.write_text(f"a.yaml: {{x: 0, y: 0, theta_deg: 0}}\nb.yaml: {b}\n")
+    outcome = run("graph", *maps, "--known-poses", poses)
+    assert (outcome.code, outcome.err) == (0, "")
 
 
 # ------------------------------------------------------------------ merge

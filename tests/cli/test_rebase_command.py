@@ -57,7 +57,7 @@ def test_json_of_a_rebase(tmp_path: Path) -> None:
     a, b = write_maps(tmp_path, "a", "b")
     outcome = run("rebase", b, "--onto", a, "-o", tmp_path / "r.yaml", "--transform", "1,2,0", "--json")
     assert outcome.code == 0
-    assert "note: the walls do not support --transform 1,2,0" in outcome.line
+    assert "note: the walls of a.yaml and b.yaml do not support --transform 1,2,0" in outcome.line
     printed = json.loads(outcome.out)
     assert printed["T_old_new"] == {"x": 1, "y": 2, "theta": 0}
     assert printed["match"] is None

@@ -95,7 +95,7 @@ def test_a_transform_is_weighed_where_the_maps_are_there(tmp_path: Path) -> None
     arguments = ["--from", a, "--to", b, "-o", tmp_path / "o.yaml", "--transform", "1,2,10"]
     outcome = run("transform-points", points, *arguments)
     assert outcome.code == 0
-    assert "the walls do not support" in outcome.line
+    assert "do not support --transform" in outcome.line
 
 
 FOLLOWED = {

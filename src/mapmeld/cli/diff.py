@@ -80,7 +80,7 @@ def diff(
     from mapmeld.changes import NoMatchError
     from mapmeld.changes import diff as diff_maps
     from mapmeld.cli.json_output import as_json, diff_fields
-    from mapmeld.cli.maps import load_maps
+    from mapmeld.cli.maps import load_maps, names_of
     from mapmeld.cli.parameters import effective_parameters
     from mapmeld.cli.placement import given_transform, note_if_unlikely, refuse
     from mapmeld.cli.progress import working
@@ -94,7 +94,7 @@ def diff(
     with working("Comparing"):
         grid_old, grid_new = load_maps([old, new], resolution)
         if transform is not None and given is not None:
-            note_if_unlikely(transform, given, grid_old, grid_new)
+            note_if_unlikely(f"--transform {transform}", given, grid_old, grid_new, names_of([old, new]))
         try:
             found = diff_maps(
                 grid_old,

@@ -57,7 +57,7 @@ def graph(
     Maps that cannot be joined stay apart; then the exit code is 1, and the graph is written all the same.
     """
     from mapmeld.cli.json_output import as_json, graph_fields
-    from mapmeld.cli.many_maps import known_for, progress_of
+    from mapmeld.cli.many_maps import known_for, note_doubtful_poses, progress_of
     from mapmeld.cli.maps import load_maps, names_of
     from mapmeld.cli.parameters import effective_parameters
     from mapmeld.cli.progress import working
@@ -99,6 +99,7 @@ def graph(
         print_graph(found, names_of(maps))
         if out is not None:
             print_files([out])
+    note_doubtful_poses(known, found.pairs, grids, names_of(maps))
     if len(found.components) > 1:
         raise typer.Exit(NO_MATCH)
 

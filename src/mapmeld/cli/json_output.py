@@ -1,7 +1,4 @@
-"""What ``--json`` prints; documented in docs/json.md, where every change must be noted.
-
-A schema's number grows when a field changes its meaning or goes away; fields may be added without.
-"""
+"""What ``--json`` prints; documented in docs/json.md, where every change must be noted."""
 
 from __future__ import annotations
 
@@ -11,6 +8,19 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from mapmeld import __version__
+from mapmeld.cli.schemas import (
+    BAG_INFO_SCHEMA,
+    DIFF_SCHEMA,
+    FIND_SCHEMA,
+    FOLLOW_SCHEMA,
+    GRAPH_SCHEMA,
+    MATCH_SCHEMA,
+    MERGE_SCHEMA,
+    NAVIGABILITY_SCHEMA,
+    REBASE_SCHEMA,
+    STEP_SCHEMA,
+    TRANSFORM_POINTS_SCHEMA,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,19 +37,6 @@ if TYPE_CHECKING:
     from mapmeld.merging import MergeResult, PairMatch
     from mapmeld.merging.graph import MapGraph
     from mapmeld.se2 import Pose2
-
-MATCH_SCHEMA = "mapmeld.match/1"
-MERGE_SCHEMA = "mapmeld.merge/1"
-BAG_INFO_SCHEMA = "mapmeld.bag.info/1"
-DIFF_SCHEMA = "mapmeld.diff/1"
-REBASE_SCHEMA = "mapmeld.rebase/1"
-TRANSFORM_POINTS_SCHEMA = "mapmeld.transform-points/1"
-NAVIGABILITY_SCHEMA = "mapmeld.navigability/1"
-
-STEP_SCHEMA = "mapmeld.follow.step/1"
-FOLLOW_SCHEMA = "mapmeld.follow/1"
-GRAPH_SCHEMA = "mapmeld.graph/1"
-FIND_SCHEMA = "mapmeld.find/1"
 
 Fields = dict[str, Any]
 
@@ -422,6 +419,7 @@ def _pair_fields(pair: PairMatch) -> Fields:
         "T_i_j": pose_fields(pair.T_i_j),
         "covariance": None if pair.covariance is None else pair.covariance.tolist(),
         "bridge": pair.bridge,
+        "against_known": pair.against_known,
         "off": None if pair.off is None else {"metres": pair.off[0], "radians": pair.off[1]},
         "match": _evidence(pair.result),
     }

@@ -82,7 +82,7 @@ def merge(
 
     If some map cannot be joined, says why, writes nothing (but see --partial) and exits with 1.
     """
-    from mapmeld.cli.many_maps import known_for, progress_of
+    from mapmeld.cli.many_maps import known_for, note_doubtful_poses, progress_of
     from mapmeld.cli.maps import load_maps, names_of
     from mapmeld.cli.parameters import effective_parameters
     from mapmeld.cli.progress import working
@@ -131,6 +131,7 @@ def merge(
             print_files(files)
         else:
             print_lines("", "Nothing written.")
+    note_doubtful_poses(known, result.pairs, grids, names_of(maps))
     if files and mode is WriteMode.TRINARY and fusion in (Fusion.LOG_ODDS, Fusion.AVERAGE):
         say(f"note: {out} keeps only free, occupied and unknown; --mode scale keeps the percentages")
     if not result.complete:

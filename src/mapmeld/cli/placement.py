@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 import typer
 
 from mapmeld.cli.errors import NO_MATCH, say
-from mapmeld.cli.json_output import FOLLOW_SCHEMA, MATCH_SCHEMA
+from mapmeld.cli.schemas import FOLLOW_SCHEMA, MATCH_SCHEMA
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from mapmeld.grid import OccupancyGrid
     from mapmeld.matching import MatchResult
     from mapmeld.se2 import Pose2
@@ -44,8 +46,10 @@ def refuse(reason: str) -> NoReturn:
     raise typer.Exit(NO_MATCH)
 
 
-def note_if_unlikely(text: str, T_a_b: Pose2, a: OccupancyGrid, b: OccupancyGrid) -> None:
-    """Say on stderr that the walls do not support a transform that was given; it is used all the same."""
+def note_if_unlikely(
+    what: str, T_a_b: Pose2, a: OccupancyGrid, b: OccupancyGrid, names: Sequence[str]
+) -> None:
+    """Say on stderr that the walls do not support what was given for two maps; it is used all the same."""
     from mapmeld.matching.correlative.assess import assess
     from mapmeld.wording import probability_text
 
@@ -54,8 +58,8 @@ def note_if_unlikely(text: str, T_a_b: Pose2, a: OccupancyGrid, b: OccupancyGrid
         return  # nothing to say, or nothing to object to
     probability = probability_text(weighed.probability)
     say(
-        f"note: the walls do not support --transform {text} (probability {probability}: {weighed.reason}); "
-        "used as given"
+        f"note: the walls of {names[0]} and {names[1]} do not support {what} "
+        f"(probability {probability}: {weighed.reason}); used as given"
     )
 
 

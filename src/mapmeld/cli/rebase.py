@@ -44,7 +44,7 @@ def rebase(
     """
     from mapmeld.changes import rebase as rebase_map
     from mapmeld.cli.json_output import as_json, rebase_fields
-    from mapmeld.cli.maps import check_map_path, exact_mode, load_maps
+    from mapmeld.cli.maps import check_map_path, exact_mode, load_maps, names_of
     from mapmeld.cli.parameters import effective_parameters
     from mapmeld.cli.placement import Placement, accepted_match, given_transform, note_if_unlikely
     from mapmeld.cli.progress import working
@@ -57,7 +57,7 @@ def rebase(
     with working("Laying down"):
         old_grid, new_grid = load_maps([onto, new], resolution)
         if transform is not None and given is not None:
-            note_if_unlikely(transform, given, old_grid, new_grid)
+            note_if_unlikely(f"--transform {transform}", given, old_grid, new_grid, names_of([onto, new]))
         placed = (
             accepted_match(old_grid, new_grid, method, parameters)
             if given is None

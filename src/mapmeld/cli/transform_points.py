@@ -53,7 +53,7 @@ def transform_points(
     The maps are matched; --transform X,Y,DEG (how A lies on B) needs no maps, a file of a match their names.
     """
     from mapmeld.cli.json_output import as_json, transform_points_fields
-    from mapmeld.cli.maps import load_maps
+    from mapmeld.cli.maps import load_maps, names_of
     from mapmeld.cli.parameters import effective_parameters
     from mapmeld.cli.placement import (
         Placement,
@@ -78,7 +78,9 @@ def transform_points(
         # Only their names are needed, so they may be elsewhere.
         with working("Weighing"), suppress(MapFileError):
             grid_to, grid_from = load_maps([to_map, from_map], resolution)
-            note_if_unlikely(transform, placed.T_a_b, grid_to, grid_from)
+            note_if_unlikely(
+                f"--transform {transform}", placed.T_a_b, grid_to, grid_from, names_of([to_map, from_map])
+            )
     else:
         with working("Matching"):
             grid_to, grid_from = load_maps([to_map, from_map], resolution)

@@ -94,6 +94,28 @@ def test_a_contradiction_of_three_is_left_open() -> None:
     assert all(p.T_i_j is None and "about as probable" in p.why for p in graph.pairs)
 
 
+def test_what_known_poses_contradict_names_them() -> None:
+    known = {0: KnownPose(TRUTH[0]), 1: KnownPose(TRUTH[1] @ FAR)}
+    graph = graph_of(3, known=known)
+    direct = pair(graph, 0, 1)
+    assert (direct.state, direct.why) == (PairState.FALSE, "contradicted by the known poses")
+    assert direct.against_known
+    for j in (0, 1):  # which of the two is wrong cannot be told
+        through = pair(graph, j, 2)
+        assert through.state is PairState.DOUBTED
+        assert through.against_known
+        assert "with the known poses as they are" in through.why
+
+
+def test_what_other_matches_contradict_is_not_laid_to_known_poses() -> None:
+    graph = graph_of(
+        5, {(1, 3): accepted(true(1, 3) @ FAR)}, {0: KnownPose(TRUTH[0]), 1: KnownPose(TRUTH[1])}
+    )
+    wrong = pair(graph, 1, 3)
+    assert (wrong.state, wrong.why) == (PairState.FALSE, "contradicted by the other matches")
+    assert not any(p.against_known for p in graph.pairs)
+
+
 def test_one_pair_is_used_as_it_is_and_rests_on_itself() -> None:
     T = Pose2(1.25, -0.5, 0.75)
     graph = solve(MAPS[:2], [(0, 1, accepted(T))])

@@ -84,6 +84,9 @@ class PairMatch:
     bridge
         Whether this used match alone holds two groups of maps together: no cycle checks it,
         it rests on its own probability.
+    against_known
+        Whether this accepted match is left out only because of known poses: among the matches alone
+        nothing contradicts it.
     off
         How far [m, rad] the match is from the poses of the graph, at the middle of map j; None where
         the graph does not relate the two maps, or the match has no transform.
@@ -97,6 +100,7 @@ class PairMatch:
     T_i_j: Pose2 | None = None
     covariance: Doubles | None = None
     bridge: bool = False
+    against_known: bool = False
     off: tuple[float, float] | None = None
 
 
@@ -158,8 +162,13 @@ def solve(
     overlooked = partial(_overlooked, maps, extents, {(pair.i, pair.j): pair.result for pair in pairs})
     found = consistent(world + 1, edges, world, overlooked, robust)
 
+    without = found.used
+    if given and not found.used.all():
+        # What the matches alone would say tells whether known poses are what contradicts a match.
+        alone = consistent(world, edges[~edges.given], None, overlooked, robust)
+        without = np.concatenate([np.ones(len(given), np.bool_), alone.used])
     for k, e in zip(accepted, range(len(given), len(edges)), strict=True):
-        pairs[k] = _judged(pairs[k], found, e, edges)
+        pairs[k] = _judged(replace(pairs[k], against_known=bool(without[e] > found.used[e])), found, e, edges)
     pairs = [_settled(pair, found.fit, extents) for pair in pairs]
     pairs, final = _fitted(pairs, Edges.of(given), extents, found.fit.poses, world)
     return _graph([_off(pair, final, extents) for pair in pairs], final, world, known or {})
@@ -201,8 +210,11 @@ def _judged(pair: PairMatch, found: Consistent, e: int, edges: Edges) -> PairMat
         return replace(pair, state=PairState.DOUBTED, why=why)
     if found.doubted[e]:
         why = "contradicted by matches that are about as probable together; none of them is used"
+        if pair.against_known:
+            why = f"with the known poses as they are, {why}"
         return replace(pair, state=PairState.DOUBTED, why=why)
-    return replace(pair, state=PairState.FALSE, why="contradicted by the other matches")
+    them = "known poses" if pair.against_known else "other matches"
+    return replace(pair, state=PairState.FALSE, why=f"contradicted by the {them}")
 
 
 def _settled(pair: PairMatch, found: Fit, extents: Sequence[Extent]) -> PairMatch:
