@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from drawing import cut, office, school, seen_from
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mapmeld.grid import OccupancyGrid
@@ -257,6 +257,8 @@ def test_growing_and_correcting_is_not_starting_anew() -> None:
 
 @settings(max_examples=25)
 @given(theta=st.floats(0.5, 5.7), x=st.floats(-4, 4), y=st.floats(-4, 4))
+@example(theta=0.51, x=1.81, y=-1.55)  # 76 % of its floor and 32 % of its walls, by chance
+@example(theta=0.66, x=3.43, y=-3.66)
 def test_the_same_place_in_another_frame_is_starting_anew(theta: float, x: float, y: float) -> None:
     # A half turn about its middle lays a rectangle of rooms on itself; its walls may agree.
     if abs(theta - math.pi) > 0.4 and abs(theta % (math.pi / 2)) > 0.3:
