@@ -11,7 +11,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -91,12 +91,13 @@ class LiveNode:
 class Robots:
     """A process that publishes maps."""
 
-    def __init__(self, domain: int, folder: Path, name: str = "all") -> None:
+    def __init__(self, domain: int, folder: Path, name: str = "all", program: Sequence[str] = ()) -> None:
         self._folder = folder
         self._count = itertools.count()
         self.name = name
+        player, *arguments = program or ("player.py", str(domain), name)
         self.process = subprocess.Popen(
-            [sys.executable, str(Path(__file__).with_name("player.py")), str(domain), name],
+            [sys.executable, str(Path(__file__).with_name(player)), *arguments],
             env=environment(domain),
             stdin=subprocess.PIPE,
             text=True,
@@ -245,6 +246,12 @@ class LiveSystem:
 
     def robots(self, name: str = "all") -> Robots:
         self._groups.append(Robots(self.domain, self.folder, name))
+        return self._groups[-1]
+
+    def lossy_robot(self, name: str, lost_of_1000: int, *, reliable: bool) -> Robots:
+        quality = "reliable" if reliable else "best-effort"
+        program = ("lossy_player.py", str(self.domain), f"/{name}/map", str(lost_of_1000), quality)
+        self._groups.append(Robots(self.domain, self.folder, name, program))
         return self._groups[-1]
 
     def another_listener(self) -> Listener:

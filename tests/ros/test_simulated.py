@@ -1,14 +1,19 @@
 """Simulated robots on real middleware: the simulator, the node and who listens are processes of their own."""
 
 import importlib.util
+import math
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
-from live_system import environment
+from live_system import LiveSystem, environment, live_system, reserved_domain, until
+
+from mapmeld.io.recordings import map_states
+from mapmeld.se2 import Pose2
 
 NEEDED = ("rclpy", "nav_msgs", "diagnostic_msgs", "std_srvs", "cyclonedds", "mujoco", "numba")
 missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]

@@ -102,7 +102,9 @@ class MatchingProcess:
                 case "know", (name, *_):
                     self._lasting["know", name] = wish
                 case (("confirm" | "forbid" | "release"), (a, b)):
-                    self._lasting["pair", *sorted((str(a), str(b)))] = wish
+                    first, second = sorted((str(a), str(b)))
+                    self._lasting["pair", first, second] = wish
+                    self._unconfirmed.pop((first, second), None)
                 case "forget", (name,):
                     self._kept.pop(str(name), None)
             self._changed.notify()
@@ -237,11 +239,10 @@ class MatchingProcess:
                     self._pending[name] = _together(incoming, self._pending.get(name))
             for name, kept in self._kept.items():
                 self._pending[name] = _together(kept, self._pending.get(name))
-            self._kept = {}
             for wish in self._still_holding():
                 self._wish_again(wish)
             # One that dies at once shall not be started in a frenzy.
-            self._changed.wait_for(self._is_closing, min(0.5 * 2**self._deaths, LONGEST_PAUSE))
+            self._changed.wait_for(self._is_closing, min(0.5 * 2 ** min(self._deaths, 8), LONGEST_PAUSE))
             self._deaths += 1
 
     def _still_holding(self) -> list[Wish]:
