@@ -77,7 +77,7 @@ class MergingNode:
         self._poses = node.create_publisher(geometry.PoseArray, "~/start_poses", latched)
         self._status = node.create_publisher(diagnostics, "~/status", latched)
         self._diagnostics = node.create_publisher(diagnostics, "/diagnostics", 10)
-        self._transforms = static_transforms(node, latched)
+        self._transforms = static_transforms(node)
         if self._transforms is None:
             self._say("tf", "no transforms on /tf_static: neither tf2_msgs nor cyclonedds can be imported")
         self._update_type = listening.system_updates()
