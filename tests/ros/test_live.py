@@ -138,6 +138,11 @@ def test_a_recording_is_replayed_and_nothing_that_is_killed_does_harm() -> None:
         second.kill()
         until(lambda: listener.robot("robot_2").get("stale") == "true", "robot_2 to be stale")
         assert listener.robot("robot_1")["stale"] == "false"
+        until(
+            lambda: "robot_2: stale, nobody publishes its map" in system.node.said(), "a line on the terminal"
+        )
+        for line in ("robot_1: first map, ", "robot_1: joined, x 0.00 m", "robot_2: joined, x "):
+            assert system.node.said().count(line) == 1, "said once"
         assert listener.joined() == {"robot_1", "robot_2"}
         assert shown(listener, last)
 
@@ -189,8 +194,10 @@ def test_services_and_parameters() -> None:
     from rcl_interfaces.srv import DescribeParameters
     from std_srvs.srv import Trigger
 
-    with live_system() as system:
+    with live_system("-p", "known_pose:=['robot_1 1 2 3']") as system:
         listener, robots = system.listener, system.robots()
+        (warning,) = system.node.warnings()
+        assert warning == "there is no parameter known_pose, it is not used; did you mean known_poses?"
         answer = listener.ask(Trigger, "save_map")
         assert not answer.success
         assert "no robots are joined" in answer.message
@@ -202,7 +209,12 @@ def test_services_and_parameters() -> None:
         assert answer.success, answer.message
         saved = mapmeld.load(system.folder / "merged_map.yaml")
         assert np.array_equal(saved.cells, listener.merged[-1].cells)
-        assert not listener.ask(Trigger, "save_map").success, "nothing is overwritten unasked"
+        answer = listener.ask(Trigger, "save_map")
+        assert not answer.success, "nothing is overwritten unasked"
+        assert "choose another save_path, or set save_overwrite to true" in answer.message
+        assert set_parameter(listener, "save_path", "floor_%Y") == ""
+        assert listener.ask(Trigger, "save_map").success
+        assert (system.folder / time.strftime("floor_%Y.yaml")).exists()
         assert set_parameter(listener, "save_overwrite", True) == ""
         assert listener.ask(Trigger, "save_map").success
 

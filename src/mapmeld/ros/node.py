@@ -22,6 +22,7 @@ from mapmeld.ros.latency import Latencies
 from mapmeld.ros.listening import Heard
 from mapmeld.ros.matching_process import Answer, MatchingProcess
 from mapmeld.ros.messages import pose_array, pose_with_covariance
+from mapmeld.ros.news import news
 from mapmeld.ros.parameters import (
     PARAMETERS,
     ParameterError,
@@ -31,6 +32,7 @@ from mapmeld.ros.parameters import (
     pose_in_words,
     robot_names,
     two_robots,
+    unknown,
 )
 from mapmeld.ros.status import diagnostic_array, items_of
 from mapmeld.ros.throttle import Throttle
@@ -63,6 +65,7 @@ class MergingNode:
         self._start_poses: dict[str, Any] = {}
         self._once_joined: set[str] = set()
         self._told: Any = None
+        self._logged: tuple[FleetState, dict[str, str]] = (self._state, {})
         self._publishing = threading.Lock()
         self._given_poses: dict[str, Any] = {}
         self._values = self._declared(list(robots))
@@ -138,6 +141,10 @@ class MergingNode:
                 ]
             default = robots if name == "robots" else about.default
             values[name] = _plain(self.node.declare_parameter(name, default, descriptor).value)
+        # ROS itself passes over what a node does not declare; rclpy has no public name for what was given.
+        given = getattr(self.node, "_parameter_overrides", {})
+        for sentence in unknown(name for name in given if not self.node.has_parameter(name)):
+            self.node.get_logger().warning(sentence)
         return values
 
     def _on_parameters(self, parameters: Any) -> Any:
@@ -348,9 +355,13 @@ class MergingNode:
             "late_ms_99": f"{1e3 * self._lateness.percentile(99):.2f}",
             "late_ms_max": f"{1e3 * self._lateness.longest:.2f}",
         }
-        items = items_of(state, self._stale(), list(self._heard), figures)
+        stale = self._stale()
+        items = items_of(state, stale, list(self._heard), figures)
         message = diagnostic_array(items, self._now())
         with self._publishing:
+            for sentence in news(self._logged[0], state, self._logged[1], stale):
+                self.node.get_logger().info(sentence)
+            self._logged = state, stale
             self._status.publish(message)
             self._diagnostics.publish(message)
 
@@ -391,7 +402,7 @@ class MergingNode:
         return handle
 
     async def _save(self, _: Any, response: Any) -> Any:
-        path, overwrite = self._values["save_path"], self._values["save_overwrite"]
+        path, overwrite = time.strftime(self._values["save_path"]), self._values["save_overwrite"]
         return await self._answered(self.matching.wish("save", path, overwrite), response)
 
     async def _reset(self, _: Any, response: Any) -> Any:
