@@ -149,6 +149,7 @@ class Listener:
         self.merged: list[OccupancyGrid] = []
         self.statuses: list[dict[str, dict[str, str]]] = []
         self.levels: dict[str, int] = {}
+        self.stamp = 0  # of the newest status [s]
         self.start_poses: list[Any] = []
         dds.prepare_fastdds()
         self._context = rclpy.Context()
@@ -186,6 +187,7 @@ class Listener:
         self.merged.append(grid)
 
     def _on_status(self, message: Any) -> None:
+        self.stamp = message.header.stamp.sec
         self.statuses.append({s.name: {v.key: v.value for v in s.values} for s in message.status})
         self.levels = {s.name: s.level[0] for s in message.status}
 
