@@ -97,8 +97,8 @@ def plan_tours(
     """Plan the mappings of one environment.
 
     All of them visit the same connected rooms, at least `common` of the floor; each visits further
-    rooms, its own choice, up to at least `share` of it, and that share of all rooms or half of them. Starts differ in place
-    and heading. The same seed gives the same tours; more of them begin with the same ones.
+    rooms, its own choice, up to at least `share` of it and that share of all rooms, or half of them. Starts
+    differ in place and heading. The same seed gives the same tours; more of them begin with the same ones.
 
     Parameters
     ----------
