@@ -6,6 +6,7 @@ Callbacks only move bytes; maps are taken apart, matched, drawn and put together
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import threading
 import time
@@ -483,6 +484,9 @@ def _spin(node: Any, robots: Sequence[str], executors: Any) -> None:
         try:
             executor = executors.SingleThreadedExecutor()
             executor.add_node(node)
+            # A collection of all that the start has left would hold a callback up for up to 0.1 s.
+            gc.collect()
+            gc.freeze()
             executor.spin()
         finally:
             merging.close()
