@@ -38,7 +38,8 @@ def test_nothing_new_is_nothing_said() -> None:
 
 
 def test_parameters_that_are_none() -> None:
-    assert unknown(["known_pose", "zzz", "qos_overrides./map.depth"]) == [
+    assert unknown(["known_pose", "merging_rte", "nonsense", "qos_overrides./map.depth"]) == [
         "there is no parameter known_pose, it is not used; did you mean known_poses?",
-        "there is no parameter zzz, it is not used",
+        "there is no parameter merging_rte, it is not used; did you mean merging_rate?",
+        "there is no parameter nonsense, it is not used",
     ]

@@ -6,6 +6,7 @@ Callbacks only move bytes; maps are taken apart, matched, drawn and put together
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import threading
 import time
@@ -141,8 +142,8 @@ class MergingNode:
                 ]
             default = robots if name == "robots" else about.default
             values[name] = _plain(self.node.declare_parameter(name, default, descriptor).value)
-        # ROS itself passes over what a node does not declare; rclpy has no public name for what was given.
-        given = getattr(self.node, "_parameter_overrides", {})
+        # ROS itself passes over what a node does not declare.
+        given = _given_parameters(self.node)
         for sentence in unknown(name for name in given if not self.node.has_parameter(name)):
             self.node.get_logger().warning(sentence)
         return values
@@ -349,6 +350,7 @@ class MergingNode:
             "callbacks": str(self._latencies.count),
             "callback_ms_99": f"{1e3 * self._latencies.percentile(99):.2f}",
             "callback_ms_max": f"{1e3 * self._latencies.longest:.2f}",
+            "callback_cpu_ms_max": f"{1e3 * self._latencies.busiest:.2f}",
             "callback_ms_max_of": " ".join(
                 f"{name.strip('_<>')}={1e3 * s:.1f}" for name, s in self._latencies.longest_of.items()
             ),
@@ -421,6 +423,11 @@ class MergingNode:
         return response
 
 
+def _given_parameters(node: Any) -> dict[str, Any]:
+    """Return what was given on the command line and in files, for which rclpy has no public name."""
+    return dict(getattr(node, "_parameter_overrides", {}))
+
+
 def _plain(value: Any) -> Any:
     return list(value) if isinstance(value, list | tuple) else value
 
@@ -448,9 +455,18 @@ def run(robots: Sequence[str] = ("auto",), ros_arguments: Sequence[str] = (), na
     executors, external = required("rclpy.executors", "ros"), rclpy.exceptions
     if importlib.util.find_spec("tf2_msgs") is None:
         dds.prepare_fastdds()
-    rclpy.init(args=["mapmeld", *ros_arguments])
     try:
-        _spin(rclpy.create_node(name), robots, executors)
+        rclpy.init(args=["mapmeld", *ros_arguments])
+    except RuntimeError as error:  # rclpy's own, which have no public name
+        raise ParameterError(f"ROS does not take its arguments: {str(error).splitlines()[0]}") from error
+    try:
+        node = rclpy.create_node(name)
+        # ROS itself passes over sections of other nodes; that there is none for this one is a slip.
+        if "--params-file" in ros_arguments and not _given_parameters(node):
+            node.get_logger().warning(
+                f"no parameter in the file is for this node, whose section is {node.get_name()}:"
+            )
+        _spin(node, robots, executors)
     except (external.InvalidParameterTypeException, external.InvalidParameterValueException) as error:
         raise ParameterError(str(error)) from error
     except (executors.ExternalShutdownException, KeyboardInterrupt):
@@ -468,6 +484,9 @@ def _spin(node: Any, robots: Sequence[str], executors: Any) -> None:
         try:
             executor = executors.SingleThreadedExecutor()
             executor.add_node(node)
+            # A collection of all that the start has left would hold a callback up for up to 0.1 s.
+            gc.collect()
+            gc.freeze()
             executor.spin()
         finally:
             merging.close()

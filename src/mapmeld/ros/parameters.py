@@ -83,7 +83,7 @@ def unknown(names: Iterable[str]) -> list[str]:
     sentences = []
     for name in names:
         if not name.startswith("qos_overrides."):  # ROS's own, for the topics that a node lets it change
-            near = get_close_matches(name, PARAMETERS, 1)
+            near = get_close_matches(name, PARAMETERS, 1, cutoff=0.7)
             hint = f"; did you mean {near[0]}?" if near else ""
             sentences.append(f"there is no parameter {name}, it is not used{hint}")
     return sentences
