@@ -1,6 +1,7 @@
 import multiprocessing
 import os
 import signal
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -111,19 +112,26 @@ posix = pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signa
 
 
 @posix
-def test_an_interruption_while_workers_start_waits_until_they_have() -> None:
+@pytest.mark.parametrize("other_threads", [0, 8])
+def test_an_interruption_while_workers_start_waits_until_they_have(other_threads: int) -> None:
     shown: list[str] = []
+    over = threading.Event()
+    others = [threading.Thread(target=over.wait) for _ in range(other_threads)]
 
     def start() -> None:
         with local._not_to_be_interrupted():
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), signal.SIGINT)  # any thread of the process may take it
             shown.append("went on")
 
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs the tests may ignore it
     try:
+        for other in others:
+            other.start()
         with pytest.raises(KeyboardInterrupt):
             start()
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
+        over.set()
         signal.signal(signal.SIGINT, before)
     assert shown == ["went on"]
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])

@@ -309,6 +309,7 @@ def test_a_robot_that_starts_anew_and_updates_of_maps() -> None:
         robots.publish("a", part)
         robots.publish("b", seen_from(cut(place, 3.0, 0.0, 16.0, 12.0), T_b))
         until(lambda: listener.joined() == {"a", "b"}, "a and b to be joined")
+        until(lambda: pair_in_world(listener, "a", "b"), "their transforms")
         T = pair_in_world(listener, "a", "b")
         assert T is not None
         assert off(T, T_b.inverse())[0] < 0.1
@@ -322,6 +323,7 @@ def test_a_robot_that_starts_anew_and_updates_of_maps() -> None:
         until(lambda: not listener.merged[-1].known.any(), "a merged map of nothing")
         robots.publish("b", seen_from(cut(place, 5.0, 0.0, 16.0, 12.0), T_anew))
         until(lambda: listener.joined() == {"a", "b"}, "b to be joined again")
+        until(lambda: pair_in_world(listener, "a", "b"), "their transforms again")
         T = pair_in_world(listener, "a", "b")
         assert T is not None
         assert off(T, T_anew.inverse())[0] < 0.1

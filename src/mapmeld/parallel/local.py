@@ -98,19 +98,25 @@ def one_thread_each() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _not_to_be_interrupted() -> Iterator[None]:
-    """Hold Ctrl-C back from this thread, and from the processes that it starts, which inherit that.
+    """Hold Ctrl-C back from this process, and from the processes that it starts meanwhile.
 
     It reaches the whole group of processes. A worker that has not come to `_start_worker` yet would
-    say, with a traceback, that it was interrupted.
+    say, with a traceback, that it was interrupted: so it inherits a mask. This process may have more
+    threads, and any of them may take the signal: so its handler only remembers that it came.
     """
-    if not hasattr(signal, "pthread_sigmask"):  # not POSIX
-        yield
+    if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
+        yield  # not POSIX, or a thread that Ctrl-C does not interrupt
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    came: list[int] = []
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    handler = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)  # what was held back comes now
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)  # what the mask held back comes now
+        signal.signal(signal.SIGINT, handler)
+        if came:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _start_worker(shared: Sequence[object], prepare: Callable[[], Any] | None) -> None:
