@@ -24,6 +24,7 @@ from mapmeld.cli.simulation_options import (
     Size,
     Wall,
 )
+from mapmeld.wording import plural
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -170,7 +171,7 @@ def simulate(
     said = [f"{name} {line}" for name, line in zip(names, lines, strict=True)]
     if picture is not None:
         write_picture(drive_picture(made, ways, " ".join(said)), picture, force=force)
-    counts = f"{recording.scans} scans" + (f", {recording.maps} maps" if slam else "")
+    counts = plural(recording.scans, "scan") + (f", {plural(recording.maps, 'map')}" if slam else "")
     print_lines(
         f"Environment: {described(made)}",
         *said,
