@@ -33,6 +33,7 @@ from mapmeld.evaluation import Kind, Pair, overlap_centroid, pose_errors, read_d
 from mapmeld.evaluation.turning import turned
 from mapmeld.grid import UNKNOWN, OccupancyGrid
 from mapmeld.index import (
+    Candidate,
     IndexedMap,
     MapIndex,
     Ranking,
@@ -224,6 +225,7 @@ def print_found(maps: Collection, queries: dict[str, list[tuple[OccupancyGrid, P
         "| queries | with a right answer | accepted and right | accepted and wrong | not judged | seconds per query |"  # noqa: E501
     )
     print("|---|--:|--:|--:|--:|--:|")
+    mistakes = []
     for kind, asked in queries.items():
         answered = right = wrong = unjudged = 0
         seconds = []
@@ -239,12 +241,34 @@ def print_found(maps: Collection, queries: dict[str, list[tuple[OccupancyGrid, P
                 judged = None if T is None else is_right(maps, number[candidate.path], q, T @ T_new_old)
                 good += judged is True
                 wrong += judged is False
+                if judged is False:
+                    mistakes.append(mistake(maps, number[candidate.path], q, candidate, T_new_old, kind))
                 unjudged += judged is None
             right += good
             answered += good > 0
         cells = [f"{answered} of {len(asked)}", f"{right}", f"{wrong}", f"{unjudged}"]
         print(f"| {kind} | " + " | ".join([*cells, f"{statistics.median(seconds):.2f}"]) + " |", flush=True)
-    print()
+    print("\nAccepted and wrong:\n" + "".join(f"- {line}\n" for line in mistakes), flush=True)
+
+
+def mistake(maps: Collection, i: int, j: int, candidate: Candidate, T_new_old: Pose2, kind: str) -> str:
+    """Say what a wrong accepted match is."""
+    names = f"{maps.building[i]} {maps.paths[i].stem}, {maps.building[j]} {maps.paths[j].stem} ({kind})"
+    assert candidate.result is not None
+    assert candidate.result.T_a_b is not None
+    probability = candidate.result.probability
+    stated = "" if probability is None else f", probability {probability:.3f}"
+    if maps.building[i] != maps.building[j]:
+        return f"{names}: another building{stated}"
+    first, second = (i, j) if (i, j) in maps.pairs else (j, i)
+    pair = maps.pairs[first, second]
+    assert pair.T_1_2 is not None
+    T = candidate.result.T_a_b @ T_new_old
+    middle = pair.centroid or overlap_centroid(maps.grids[first], maps.grids[second], pair.T_1_2)
+    assert middle is not None
+    errors = pose_errors(T if first == i else T.inverse(), pair.T_1_2, middle)
+    off = f"{errors.translation:.2f} m, {math.degrees(errors.rotation):.1f} degrees off"
+    return f"{names}: {off}, overlap {pair.overlap or math.nan:.2f}{stated}"
 
 
 def indexed(maps: Collection) -> MapIndex:
