@@ -132,6 +132,17 @@ def test_added_border_is_unknown_and_moves_nothing(
     np.testing.assert_array_equal(back.cells, grid.cells)
 
 
+@given(st.integers(-2000, 2000), st.integers(0, 2000))
+def test_a_border_leaves_no_rounding_errors_in_the_origin(cells: int, added: int) -> None:
+    grid = OccupancyGrid(np.zeros((1, 1), np.int8), 0.05, Pose2(cells / 20, 0.1, 0.0))
+    assert grid.extended(added, 0, 0, 0).origin == Pose2((cells - added) / 20, 0.1, 0.0)
+
+
+def test_a_border_keeps_what_is_no_rounding_error() -> None:
+    origin = Pose2(1 / 3, 2e-10, 0.0)
+    assert OccupancyGrid(np.zeros((1, 1), np.int8), 0.05, origin).extended(0, 0, 1, 1).origin == origin
+
+
 @given(grids, st.integers(0, 3))
 def test_cropping_keeps_what_is_known_where_it_is(grid: OccupancyGrid, margin: int) -> None:
     cropped = grid.cropped(margin)

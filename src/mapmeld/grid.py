@@ -161,8 +161,8 @@ class OccupancyGrid:
         c0, c1 = max(0, -left), min(cols, cols + right)
         if r0 < r1 and c0 < c1:
             cells[r0 + bottom : r1 + bottom, c0 + left : c1 + left] = self.cells[r0:r1, c0:c1]
-        x, y = self.lattice_to_metres((-left, -bottom))
-        return replace(self, cells=cells, origin=Pose2(float(x), float(y), self.origin.theta))
+        x, y = map(_without_noise, self.lattice_to_metres((-left, -bottom)).tolist())
+        return replace(self, cells=cells, origin=Pose2(x, y, self.origin.theta))
 
     def cropped(self, margin: int = 0) -> OccupancyGrid:
         """Return the map cut (or grown) to its known cells and `margin` cells around them.
@@ -192,6 +192,12 @@ class OccupancyGrid:
         image[self.free] = 254
         image[self.occupied] = 0
         return np.ascontiguousarray(image[::-1])
+
+
+def _without_noise(metres: float) -> float:
+    """Return -19.2 for -19.200000000000003: what only the arithmetic added is not worth writing down."""
+    plain = round(metres, 9)
+    return plain if abs(plain - metres) < 1e-12 else metres
 
 
 MAX_RATIO = 100

@@ -17,3 +17,8 @@ def probability_text(probability: float | None) -> str:
     if 0 < probability < 0.0005:
         return "< 0.001"
     return rounded(probability, 3)
+
+
+def plural(number: int, noun: str) -> str:
+    """Return "1 map", "2 maps"."""
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"

@@ -38,7 +38,10 @@ def test_info_lists_the_maps(file: Path) -> None:
     assert lines[1][0] == "/robot_1/map"
     assert lines[1][2:] == ["15", "0", "0.000", "121.650", "338", "x", "386", "0.05", "robot_1/map"]
     assert lines[2][0] == "/robot_2/map"
-    assert len(lines) == 3
+    assert done.out.splitlines()[3:] == [
+        "",
+        f"For other commands: {file}#/robot_1/map, or with @SECONDS the map at that time.",
+    ]
 
 
 def test_info_for_programs(file: Path) -> None:

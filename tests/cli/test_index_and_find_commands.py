@@ -48,7 +48,7 @@ def test_exit_code_1_if_no_map_shows_the_place(archive: Path) -> None:
     assert run("find", other, "--in", archive.parent / "i", "--candidates-only").code == 0
     lonely = run("find", archive / "empty.yaml", "--in", archive.parent / "i", "--candidates-only")
     assert lonely.code == 1
-    assert "None of the 2 maps in the index looks like" in lonely.out
+    assert "Of 2 maps in the index, none looks like" in lonely.out
 
 
 def test_json_has_the_transform_into_each_map(archive: Path) -> None:

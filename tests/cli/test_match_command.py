@@ -24,7 +24,8 @@ def test_an_accepted_match(tmp_path: Path) -> None:
     assert rows["verdict"] == "accepted"
     assert 0.98 < float(rows["probability"].removeprefix("> ")) <= 1
     assert "wall in the overlap" in rows["reason"]
-    assert re.fullmatch(r"dev +x 0\.0\d\d m, y 0\.0\d\d m, theta 0\.\d\d deg", rows["std"])
+    deviations = r"dev +x 0\.0\d\d m, y 0\.0\d\d m, theta 0\.\d\d deg"
+    assert re.fullmatch(rf"{deviations} \(of the best rigid fit; drift .*\)", rows["std"])
     x, y, theta = (float(rows["T_a_b"].split()[i]) for i in (1, 4, 7))
     assert math.hypot(x - T_A_B.x, y - T_A_B.y) < 0.2
     assert theta == pytest.approx(math.degrees(T_A_B.theta), abs=1)
@@ -84,7 +85,7 @@ def test_covariance_and_probability_are_passed_on(tmp_path: Path, monkeypatch: p
     assert parsed["probability"] == 0.5
     assert parsed["covariance"] == [[1, 0, 0], [0, 4, 0], [0, 0, math.radians(3) ** 2]]
     table = re.sub(" +", " ", run("match", a, b).out)
-    assert "\nstd dev x 1.000 m, y 2.000 m, theta 3.00 deg\n" in table
+    assert "\nstd dev x 1.000 m, y 2.000 m, theta 3.00 deg (of the best rigid fit; " in table
     assert "\nprobability 0.500\n" in table
     assert "\nor x 4.000 m, y 5.000 m, theta 0.00 deg; probability 0.410\n" in table
 

@@ -22,7 +22,7 @@ def test_from_one_map_to_another(tmp_path: Path) -> None:
     outcome = run("transform-points", points, "--from", a, "--to", b, "-o", tmp_path / "o.yaml")
     assert (outcome.code, outcome.err) == (0, "")
     assert outcome.out.startswith("T_to_from: x ")
-    assert f"Written: {tmp_path / 'o.yaml'} (1 points, 1 poses)\n" in outcome.out
+    assert f"Written: {tmp_path / 'o.yaml'} (1 point, 1 pose)\n" in outcome.out
     moved = yaml.safe_load((tmp_path / "o.yaml").read_text())
     (point,), (pose,) = moved["points"], moved["poses"]
     assert point["name"] == "charger"

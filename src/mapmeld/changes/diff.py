@@ -16,6 +16,7 @@ from mapmeld.grid import UNKNOWN, Cells, OccupancyGrid, check_resolutions
 from mapmeld.matching import DEFAULT_METHOD, MatchResult, Verdict, match
 from mapmeld.merging import lattice_for_all
 from mapmeld.se2 import Pose2
+from mapmeld.wording import plural
 
 TOLERANCE = 0.2
 """[m]; what local bending leaves of drift, and walls drawn by other scans."""
@@ -91,7 +92,7 @@ class MapDiff:
         parts = []
         for kind, change in (("appeared", Change.APPEARED), ("vanished", Change.VANISHED)):
             regions = self.count(kind)
-            places = f" in {regions} place{'s' * (regions != 1)}" if regions else ""
+            places = f" in {plural(regions, 'place')}" if regions else ""
             parts.append(f"{self.area(change):.2f} m2 of obstacles {kind}{places}")
         both = sum(self.area(c) for c in (Change.SAME, Change.APPEARED, Change.VANISHED))
         parts.append(f"{self.area(Change.EXPLORED):.1f} m2 newly explored")

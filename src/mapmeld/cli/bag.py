@@ -13,6 +13,7 @@ import typer
 
 from mapmeld.cli.errors import say
 from mapmeld.cli.options import FolderOut, Force, Json
+from mapmeld.wording import plural
 
 if TYPE_CHECKING:
     from mapmeld.io.recordings import MapStates, RecordingInfo
@@ -54,7 +55,7 @@ def info(file: Recording, json: Json = False, damaged: DamagedOption = Damaged.R
 
         typer.echo(as_json(bag_info_fields(found, file)))
     else:
-        _print(found)
+        _print(found, file)
     _say_left_out(file, found.left_out)
 
 
@@ -99,7 +100,7 @@ def export(
                 left_out += states.left_out - states.damage
                 damage = states.damage
         left_out += damage  # the same for all
-    print_lines(*(f"{name}: {count} maps in {place}" for name, (place, count) in written.items()))
+    print_lines(*(f"{name}: {plural(count, 'map')} in {place}" for name, (place, count) in written.items()))
     _say_left_out(file, left_out)
 
 
@@ -128,7 +129,7 @@ def _folders_of(topics: list[str]) -> dict[str, str]:
     return folders
 
 
-def _print(found: RecordingInfo) -> None:
+def _print(found: RecordingInfo, file: str) -> None:
     from rich.table import Table
     from rich.text import Text
 
@@ -156,6 +157,9 @@ def _print(found: RecordingInfo) -> None:
     for topic in found.topics:
         if topic.problem is not None:
             print_lines(f"{topic.name}: {topic.problem}")
+    readable = [topic.name for topic in found.topics if topic.problem is None]
+    if readable:
+        print_lines("", f"For other commands: {file}#{readable[0]}, or with @SECONDS the map at that time.")
 
 
 def _say_left_out(file: str, left_out: Mapping[str, int]) -> None:

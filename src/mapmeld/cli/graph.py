@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -27,9 +27,6 @@ from mapmeld.cli.options import (
     Strategy,
     Workers,
 )
-
-if TYPE_CHECKING:
-    pass
 
 
 def graph(

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from mapmeld.cli.options import Force, Workers
+from mapmeld.wording import plural
 
 
 def index(
@@ -57,5 +58,5 @@ def index(
     counts = (
         f"{built.read} read, {built.kept} unchanged, {len(built.gone)} gone, {len(built.skipped)} skipped"
     )
-    print_lines(f"{len(built.index.maps)} maps in the index: {counts}.")
+    print_lines(f"{plural(len(built.index.maps), 'map')} in the index: {counts}.")
     print_files([target])

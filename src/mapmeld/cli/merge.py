@@ -130,7 +130,9 @@ def merge(
         if files:
             print_files(files)
         else:
-            print_lines("", "Nothing written.")
+            joined = len(result.components[0])
+            hint = f" --partial writes the {joined} maps that were joined." if joined > 1 else ""
+            print_lines("", f"Nothing written.{hint}")
     note_doubtful_poses(known, result.pairs, grids, names_of(maps))
     if files and mode is WriteMode.TRINARY and fusion in (Fusion.LOG_ODDS, Fusion.AVERAGE):
         say(f"note: {out} keeps only free, occupied and unknown; --mode scale keeps the percentages")

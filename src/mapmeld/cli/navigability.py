@@ -11,6 +11,7 @@ import typer
 
 from mapmeld.cli.errors import NO_MATCH, say
 from mapmeld.cli.options import DEFAULT_METHOD, Force, Json, Resolution
+from mapmeld.wording import plural
 
 if TYPE_CHECKING:
     from mapmeld.evaluation import Navigability, Reach
@@ -64,13 +65,16 @@ def navigability(
     pairs: Annotated[int, typer.Option(metavar="N", min=1, max=100_000, help="Of random poses.")] = 200,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of the random poses.")] = 0,
     picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="PNG", help="Draw floor and ways.")
+        Path | None,
+        typer.Option(
+            "--picture", metavar="PNG", help="Draw where a robot can be and, with --truth, the ways."
+        ),
     ] = None,
     force: Force = False,
     json: Json = False,
     resolution: Resolution = None,
 ) -> None:
-    """Plan ways on a map for a round robot, and compare them with the truth if there is one.
+    """Find out what a round robot can reach on a map, and with --truth, which ways planned on it are right.
 
     False passages lead through what is an obstacle in truth, false blocks are where only the map has no way;
     the length ratio is planned way / true shortest. Exits with 1 if --align finds no acceptable match.
@@ -174,15 +178,15 @@ def _lines(reached: Reach, found: Navigability | None, radius: float) -> list[st
         line("drivable", f"{reached.drivable_area:.1f} m2, for the centre of a robot of radius {radius:g} m"),
         line(
             "reachable",
-            f"{reached.reachable_area:.1f} m2; the floor is in {_count(reached.components, 'part')}",
+            f"{reached.reachable_area:.1f} m2; the floor is in {plural(reached.components, 'part')}",
         ),
-        line("ways", f"{reached.reachable} of {_count(reached.pairs, 'pair')} of poses on the map"),
+        line("ways", f"{reached.reachable} of {plural(reached.pairs, 'pair')} of poses on the map"),
     ]
     if found is None:
         return lines
     lines += [
         "",
-        f"{_count(found.pairs, 'pair')} of poses that are free on the map and in truth:",
+        f"{plural(found.pairs, 'pair')} of poses that are free on the map and in truth:",
         line("way on the map", str(found.reachable_map)),
         line("way in truth", str(found.reachable_truth)),
         line("way on both", str(found.reachable_both)),
@@ -197,19 +201,15 @@ def _lines(reached: Reach, found: Navigability | None, radius: float) -> list[st
     return lines
 
 
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
 def _summary(reached: Reach, found: Navigability | None) -> str:
     if found is None:
         return (
             f"{reached.reachable_area:.0f} of {reached.free_area:.0f} square metres of floor can be reached; "
-            f"it is in {_count(reached.components, 'part')}."
+            f"it is in {plural(reached.components, 'part')}."
         )
     ratio = "" if found.length_ratio is None else f" Planned ways are {found.length_ratio:.3f} times as long."
     return (
-        f"Of {_count(found.pairs, 'pair')} of poses, {found.reachable_map} have a way on the map and "
+        f"Of {plural(found.pairs, 'pair')} of poses, {found.reachable_map} have a way on the map and "
         f"{found.reachable_truth} in truth.{ratio}"
     )
 

@@ -74,17 +74,21 @@ def reproduce(
     """
     from dataclasses import replace
 
+    from mapmeld.extras import required
+
+    # Before what imports them, which asks for them in the name of other extras.
+    for module in ("numba", "matplotlib.figure"):
+        required(module, "reproduce")
+
     from mapmeld.cli.progress import counting, working
     from mapmeld.cli.simulation_options import sides
     from mapmeld.cli.tables import print_files
     from mapmeld.experiment import ExperimentSettings, run_experiment
     from mapmeld.experiment.pages.report import RESULTS, write_report
     from mapmeld.experiment.settings import PAPER_METHOD
-    from mapmeld.extras import required
     from mapmeld.matching import DEFAULT_METHOD
     from mapmeld.simulation import Settings
 
-    required("matplotlib.figure", "reproduce")
     names = {PAPER: PAPER_METHOD, DEFAULT: DEFAULT_METHOD}
     place = Settings()
     if size is not None:

@@ -26,6 +26,7 @@ from mapmeld.cli.simulation_options import (
     Size,
     Wall,
 )
+from mapmeld.wording import plural
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -230,7 +231,8 @@ def simulate(
         write_picture(drive_picture(made, ways, " ".join(said)), picture, force=force)
     counts = ""
     if out is not None:
-        counts = f" ({recording.scans} scans" + (f", {recording.maps} maps)" if slam else ")")
+        maps = f", {plural(recording.maps, 'map')}" if slam else ""
+        counts = f" ({plural(recording.scans, 'scan')}{maps})"
     print_lines(
         f"Environment: {described(made)}",
         *said,

@@ -9,6 +9,7 @@ import typer
 
 from mapmeld.cli.errors import say
 from mapmeld.cli.options import FolderOut, Force
+from mapmeld.wording import plural
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -102,7 +103,7 @@ def slam(
         write_trajectory(path, folder / TRAJECTORY)
     rows, cols = grid.shape
     print_lines(
-        f"{len(path.stamps)} scans used over {path.stamps[-1] - path.stamps[0]:.1f} s; "
+        f"{plural(len(path.stamps), 'scan')} used over {path.stamps[-1] - path.stamps[0]:.1f} s; "
         f"a map of {cols * grid.resolution:.1f} m x {rows * grid.resolution:.1f} m, "
         f"{grid.known_area:.1f} m² known",
         "",
@@ -110,7 +111,7 @@ def slam(
         f"  {MAP}, map.pgm  the map, as ROS map_server and nav2 read it",
         f"  {TRAJECTORY}     t x y z qx qy qz qw of the robot at these scans",
         *(
-            [f"  {HISTORY}/           {maps} states of the map, with their times in times.txt"]
+            [f"  {HISTORY}/           {plural(maps, 'state')} of the map, with times in times.txt"]
             if history
             else []
         ),

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from mapmeld.io import printable
-from mapmeld.wording import probability_text, rounded
+from mapmeld.wording import plural, probability_text, rounded
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -44,11 +44,15 @@ def pose_text(pose: Pose2 | None) -> str:
 
 
 def deviations_text(covariance: NDArray[np.float64] | None) -> str | None:
-    """Return the standard deviations of x, y and theta that a covariance (3, 3) gives; None of None."""
+    """Return the standard deviations of x, y and theta that a covariance (3, 3) of a match gives.
+
+    None of None. Words behind them say what they leave out.
+    """
     if covariance is None:
         return None
     x, y, theta = (math.sqrt(max(float(covariance[i, i]), 0.0)) for i in range(3))
-    return f"x {rounded(x, 3)} m, y {rounded(y, 3)} m, theta {rounded(math.degrees(theta), 2)} deg"
+    spread = f"x {rounded(x, 3)} m, y {rounded(y, 3)} m, theta {rounded(math.degrees(theta), 2)} deg"
+    return f"{spread} (of the best rigid fit; drift within the maps is not in it)"
 
 
 def print_lines(*lines: str) -> None:
@@ -156,7 +160,7 @@ def print_graph(graph: MapGraph, names: Sequence[str]) -> None:
 def print_found(found: Sequence[Candidate], index: MapIndex, name: str) -> None:
     """Print the maps that may show the same place as the map of that name, and where it lies in them."""
     if not found:
-        print_lines(f"None of the {len(index.maps)} maps in the index looks like {name}.")
+        print_lines(f"Of {plural(len(index.maps), 'map')} in the index, none looks like {name}.")
         return
     table = Table(box=None, padding=(0, 2, 0, 0), header_style="dim", pad_edge=False)
     table.add_column("map", overflow="fold")
@@ -202,7 +206,7 @@ def print_pairs(pairs: Sequence[PairMatch], names: Sequence[str]) -> None:
         for state in ("used", "settled", "false", "doubted")
         if state in states or state == "used"
     )
-    print_lines("", f"Of {len(pairs)} pairs: {told}.")
+    print_lines("", f"Of {plural(len(pairs), 'pair')}: {told}.")
     for pair in pairs:
         if pair.state in ("false", "doubted", "settled") or pair.bridge:
             state = "bridge" if pair.bridge else str(pair.state)

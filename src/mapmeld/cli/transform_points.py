@@ -18,6 +18,7 @@ from mapmeld.cli.options import (
     Settings,
     Transform,
 )
+from mapmeld.wording import plural
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -132,4 +133,5 @@ def _reader(points: Path, out: Path, to_map: str | None) -> Callable[[Pose2], tu
 
 
 def _counted(count: dict[str, int]) -> str:
-    return ", ".join(f"{number} {kind}" for kind, number in count.items()) or "nothing in it"
+    said = [plural(number, kind.removesuffix("s")) for kind, number in count.items()]
+    return ", ".join(said) or "nothing in it"

@@ -22,6 +22,7 @@ from mapmeld.matching.correlative import CorrelativeParameters
 from mapmeld.matching.correlative.assess import assess
 from mapmeld.matching.correlative.matcher import LOOKED_AT
 from mapmeld.se2 import Pose2
+from mapmeld.wording import probability_text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -284,4 +285,4 @@ def _lies_on(before: OccupancyGrid, now: OccupancyGrid) -> bool:
 
 
 def _p(probability: float | None) -> str:
-    return f"{probability or 0.0:.3f}"
+    return probability_text(probability or 0.0)

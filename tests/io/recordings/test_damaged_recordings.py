@@ -387,11 +387,11 @@ def test_maps_that_were_all_in_a_damaged_chunk_are_said_to_be_lost(tmp_path: Pat
 @pytest.mark.parametrize(
     ("error", "said"),
     [
-        (EOFError(), "it is cut off, its end is missing [EOFError]"),
-        (ValueError("unpack requires a buffer of 8 bytes"), "it is cut off, its end is missing [unpack"),
-        (ValueError("unknown (opcode 158) record has length 9"), "a part is damaged [unknown (opcode 158)"),
+        (EOFError(), "it is cut off, its end is missing"),
+        (ValueError("unpack requires a buffer of 8 bytes"), "it is cut off, its end is missing"),
+        (ValueError("unknown (opcode 158) record has length 9"), "a part is garbled"),
         (ValueError("Bag is not indexed."), "Bag is not indexed"),
     ],
 )
 def test_damage_in_words(error: Exception, said: str) -> None:
-    assert reason_of(error).startswith(said)
+    assert reason_of(error) == said

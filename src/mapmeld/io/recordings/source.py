@@ -92,10 +92,11 @@ _GARBLED = re.compile(r"opcode|crc|checksum|malformed|codec can't|out of range|i
 
 
 def reason_of(error: Exception) -> str:
-    """Return what a library says of damage, short and on one line."""
+    """Return what the damage is in plain words; where it fits none, what the library says, on one line."""
     text = " ".join(str(error).split()).rstrip(".").removesuffix("; please report issue")
     text = text or type(error).__name__
-    text = text if len(text) <= 120 else text[:117] + "..."
     if _CUT_OFF.search(text):
-        return f"it is cut off, its end is missing [{text}]"
-    return f"a part is damaged [{text}]" if _GARBLED.search(text) else text
+        return "it is cut off, its end is missing"
+    if _GARBLED.search(text):
+        return "a part is garbled"
+    return text if len(text) <= 120 else text[:117] + "..."

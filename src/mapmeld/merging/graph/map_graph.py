@@ -34,6 +34,7 @@ from mapmeld.merging.graph.known_poses import KnownPose
 from mapmeld.merging.graph.least_squares import Fit, errors, fit, parts, residuals
 from mapmeld.merging.graph.robust import Robust, graduated
 from mapmeld.se2 import Pose2
+from mapmeld.wording import probability_text
 
 MUCH_OVERLAP = 0.3
 """Overlap from which two maps that lie right are expected to match."""
@@ -198,7 +199,11 @@ def _spread(pair: PairMatch, T_i_j: Pose2, extents: Sequence[Extent]) -> tuple[D
 
 # ---------------------------------------------------------------------- what becomes of a match
 def _judged(pair: PairMatch, found: Consistent, e: int, edges: Edges) -> PairMatch:
-    sure = "" if pair.result.probability is None else f", probability {pair.result.probability:.3f}"
+    sure = (
+        ""
+        if pair.result.probability is None
+        else f", probability {probability_text(pair.result.probability)}"
+    )
     if found.used[e]:
         rest = edges[found.used & (np.arange(len(edges)) != e)]
         labels = parts(len(found.fit.poses), rest)
