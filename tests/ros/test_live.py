@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import yaml
 from drawing import cut, office, school, seen_from
-from live_system import Listener, LiveSystem, live_system, until
+from live_system import Listener, live_system, until
 
 import mapmeld
 from mapmeld.grid import OccupancyGrid
@@ -492,10 +492,13 @@ def test_known_start_poses_without_matching_lay_maps_with_yaw_and_origins() -> N
             assert sum(off(there, T)) < 1e-6
 
 
-def test_node_that_is_asked_to_end_does_so_quietly() -> None:
-    with live_system("--robots", "nobody") as system:
+def test_node_that_is_asked_to_end_does_so_quietly(tmp_path: Path) -> None:
+    file = tmp_path / "other.yaml"
+    file.write_text("map_merge:\n  ros__parameters:\n    merging_rate: 2.0\n")
+    with live_system("--robots", "nobody", "--params-file", str(file)) as system:
         until(lambda: system.listener.statuses, "a status")
         assert system.listener.figures["joined"] == ""
         assert system.node.stop() == 0
         assert "Traceback" not in system.node.said()
-        assert isinstance(system, LiveSystem)
+        (warning,) = system.node.warnings()
+        assert warning == "no parameter in the file is for this node, whose section is mapmeld:"
