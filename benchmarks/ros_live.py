@@ -9,10 +9,13 @@ Starts the node, a process of robots and listens itself, all on this machine's l
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+
+import yaml
 
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests/ros")]
@@ -21,8 +24,12 @@ from live_system import LiveSystem, live_system  # noqa: E402
 
 import mapmeld  # noqa: E402
 from mapmeld.grid import OccupancyGrid  # noqa: E402
+from mapmeld.se2 import Pose2  # noqa: E402
 
 LARGE = 2000
+
+RIGHT = 0.3
+"""[m] A merge within this of the truth is right."""
 
 
 def padded(grid: OccupancyGrid, shift: int) -> OccupancyGrid:
@@ -46,8 +53,8 @@ def figures(system: LiveSystem, began: float) -> str:
     """Return one line of the node's own figures."""
     f = system.listener.figures
     names = (
-        "joined", "callbacks", "callback_ms_99", "callback_ms_max", "callback_ms_max_of", "late_ms_99",
-        "late_ms_max",
+        "joined", "callbacks", "callback_ms_99", "callback_ms_max", "callback_cpu_ms_max",
+        "callback_ms_max_of", "late_ms_99", "late_ms_max",
         "node_cpu_seconds", "matching_cpu_seconds", "node_memory_mb", "matching_memory_mb", "pairs_waiting",
     )  # fmt: skip
     return f"{time.monotonic() - began:6.1f} s  " + ", ".join(f"{n} {f.get(n, '')}" for n in names)
@@ -71,6 +78,14 @@ def large(seconds: float, full: bool) -> None:
                 print(figures(system, began), flush=True)
 
 
+def pair_below_world(transforms: dict[str, tuple[str, Pose2]], a: str, b: str) -> Pose2 | None:
+    """Return T_a_b by /tf_static, if both maps' frames hang below the world."""
+    poses = {name: T for name, (parent, T) in transforms.items() if parent == "world"}
+    if not {f"{a}/map", f"{b}/map"} <= poses.keys():
+        return None
+    return poses[f"{a}/map"].inverse() @ poses[f"{b}/map"]
+
+
 def replay(seconds: float) -> None:
     """Replay the example recording again and again, with the restarts of its robots."""
     from mapmeld.io.recordings import map_states
@@ -80,7 +95,9 @@ def replay(seconds: float) -> None:
     with live_system() as system:
         robots = system.robots()
         files = {name: [robots.file(g, f"{name}/map") for g in grids] for name, grids in states.items()}
-        began, last, first_joined = time.monotonic(), 0.0, None
+        truth = Pose2(*yaml.safe_load((ROOT / "examples/maps/truth.yaml").read_text())["transforms"]["T_1_2"])
+        began, last, looked, first = time.monotonic(), 0.0, 0, None
+        worst = (0.0, 0.0)
         step = 0
         while time.monotonic() - began < seconds:
             for name, paths in files.items():
@@ -88,12 +105,24 @@ def replay(seconds: float) -> None:
                 robots.tell(topic=f"/{name}/map", map=paths[min(step % 60, len(paths) - 1)])
             time.sleep(0.8)
             step += 1
-            if first_joined is None and system.listener.joined():
-                first_joined = time.monotonic() - began
-                print(f"first joined after {first_joined:.1f} s", flush=True)
+            told = system.listener.transforms
+            for transforms in told[looked:]:
+                T = pair_below_world(transforms, *states)
+                if T is not None:
+                    metres, radians = T.distance_to(truth)
+                    worst = (max(worst[0], metres), max(worst[1], math.degrees(radians)))
+                    if first is None and metres < RIGHT:
+                        first = time.monotonic() - began
+                        print(f"first right merge after {first:.1f} s, {metres:.2f} m off", flush=True)
+            looked = len(told)
             if time.monotonic() - last > 15:
                 last = time.monotonic()
                 print(figures(system, began), flush=True)
+        print(
+            f"{looked} times told on /tf_static, at most {worst[0]:.2f} m and {worst[1]:.1f} degrees off; "
+            f"{len(system.node.warnings())} warnings",
+            flush=True,
+        )
 
 
 def main() -> None:

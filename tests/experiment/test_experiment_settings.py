@@ -1,4 +1,5 @@
 import json
+import math
 
 import pytest
 from hypothesis import given
@@ -15,6 +16,8 @@ from mapmeld.matching.match import UnknownMethodError
         ({"environments": 0}, "environments must be in 1..99, not 0"),
         ({"mappings": 1}, "mappings must be in 2..9, not 1"),
         ({"seed": -1}, "seed must be in 0..1000000, not -1"),
+        ({"common": 0.5, "share": 0.4}, "common <= share <= 1 is needed, not common 0.5 and share 0.4"),
+        ({"share": math.nan}, "share nan"),
         ({"methods": ()}, "at least one method"),
         ({"methods": ("alphabet", "alphabet")}, "there twice: alphabet, alphabet"),
     ],
@@ -53,4 +56,5 @@ def test_all_settings_are_kept_as_json() -> None:
     assert kept["seed"] == 3
     assert kept["slam"]["particles"] == 30
     assert kept["place"]["configuration"]["rooms"] == 10
+    assert (kept["common"], kept["share"]) == (0.35, 0.65)
     assert kept["methods"] == {"alphabet": "paper", "correlative": "evidence"}

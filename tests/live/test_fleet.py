@@ -255,6 +255,11 @@ def test_growing_and_correcting_is_not_starting_anew() -> None:
     assert started_anew(nothing, A) is None
 
 
+@pytest.mark.parametrize(("theta", "x", "y"), [(0.51, 1.81, -1.55), (0.66, 3.43, -3.66)])
+def test_walls_that_agree_by_chance_do_not_hide_a_new_start(theta: float, x: float, y: float) -> None:
+    assert started_anew(PLACE, seen_from(PLACE, Pose2(x, y, theta))) is not None
+
+
 def test_the_same_place_in_another_frame_is_nearly_always_seen_as_starting_anew() -> None:
     rng = np.random.default_rng(0)
     drawn = rng.uniform((-4, -4, 0.5), (4, 4, 5.7), (200, 3)).tolist()

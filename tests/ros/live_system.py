@@ -1,5 +1,6 @@
 """The node, robots and a listener as processes of their own, on a DDS domain of their own on the loopback."""
 
+import fcntl
 import itertools
 import json
 import os
@@ -10,7 +11,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -25,21 +26,26 @@ PATIENCE = 60.0
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"  # of the listener, too
 
-_domains = itertools.count(os.getpid() % 60)
 
+@contextmanager
+def reserved_domain() -> Iterator[int]:
+    """A domain of one's own: no other test has it while the block runs, whatever process it is in.
 
-def free_domain() -> int:
-    """A domain in which nobody on this machine takes part, as far as its first ports tell."""
-    for number in _domains:
-        domain = 10 + number % 80
-        try:
-            for participant in (0, 1):
-                with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-                    taken.bind(("", 7400 + 250 * domain + 10 + 2 * participant))
-        except OSError:
-            continue
-        return domain
-    raise AssertionError
+    A lock that ends with its process tells tests apart; first ports that are taken, somebody else's nodes.
+    """
+    for number in range(80):
+        domain = 10 + (os.getpid() + number) % 80
+        with (Path(tempfile.gettempdir()) / f"mapmeld_test_domain_{domain}").open("w") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                for participant in (0, 1):
+                    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+                        taken.bind(("", 7400 + 250 * domain + 10 + 2 * participant))
+            except OSError:
+                continue
+            yield domain
+            return
+    raise AssertionError("no domain is free")
 
 
 def environment(domain: int) -> dict[str, str]:
@@ -85,12 +91,13 @@ class LiveNode:
 class Robots:
     """A process that publishes maps."""
 
-    def __init__(self, domain: int, folder: Path, name: str = "all") -> None:
+    def __init__(self, domain: int, folder: Path, name: str = "all", program: Sequence[str] = ()) -> None:
         self._folder = folder
         self._count = itertools.count()
         self.name = name
+        player, *arguments = program or ("player.py", str(domain), name)
         self.process = subprocess.Popen(
-            [sys.executable, str(Path(__file__).with_name("player.py")), str(domain), name],
+            [sys.executable, str(Path(__file__).with_name(player)), *arguments],
             env=environment(domain),
             stdin=subprocess.PIPE,
             text=True,
@@ -142,6 +149,7 @@ class Listener:
         self.merged: list[OccupancyGrid] = []
         self.statuses: list[dict[str, dict[str, str]]] = []
         self.levels: dict[str, int] = {}
+        self.stamp = 0  # of the newest status [s]
         self.start_poses: list[Any] = []
         dds.prepare_fastdds()
         self._context = rclpy.Context()
@@ -179,6 +187,7 @@ class Listener:
         self.merged.append(grid)
 
     def _on_status(self, message: Any) -> None:
+        self.stamp = message.header.stamp.sec
         self.statuses.append({s.name: {v.key: v.value for v in s.values} for s in message.status})
         self.levels = {s.name: s.level[0] for s in message.status}
 
@@ -226,8 +235,8 @@ def until(happens: Callable[[], object], what: str, patience: float = PATIENCE) 
 class LiveSystem:
     """A node, robots and a listener."""
 
-    def __init__(self, folder: Path, *arguments: str) -> None:
-        self.domain, self.folder, self.arguments = free_domain(), folder, arguments
+    def __init__(self, domain: int, folder: Path, *arguments: str) -> None:
+        self.domain, self.folder, self.arguments = domain, folder, arguments
         self._groups: list[Robots] = []
         self._listeners: list[Listener] = []
         self.node = LiveNode(self.domain, folder, *arguments)
@@ -239,6 +248,12 @@ class LiveSystem:
 
     def robots(self, name: str = "all") -> Robots:
         self._groups.append(Robots(self.domain, self.folder, name))
+        return self._groups[-1]
+
+    def lossy_robot(self, name: str, lost_of_1000: int, *, reliable: bool) -> Robots:
+        quality = "reliable" if reliable else "best-effort"
+        program = ("lossy_player.py", str(self.domain), f"/{name}/map", str(lost_of_1000), quality)
+        self._groups.append(Robots(self.domain, self.folder, name, program))
         return self._groups[-1]
 
     def another_listener(self) -> Listener:
@@ -258,8 +273,8 @@ class LiveSystem:
 
 @contextmanager
 def live_system(*arguments: str) -> Iterator[LiveSystem]:
-    with tempfile.TemporaryDirectory() as folder:
-        system = LiveSystem(Path(folder), *arguments)
+    with tempfile.TemporaryDirectory() as folder, reserved_domain() as domain:
+        system = LiveSystem(domain, Path(folder), *arguments)
         try:
             yield system
         except BaseException:

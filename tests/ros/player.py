@@ -1,7 +1,8 @@
 """Robots for the tests: publishes maps as it is told on stdin, until stdin ends.
 
 Each line is a JSON object: {"topic": ..., "map": FILE.npz} publishes a map; {"sleep": seconds} waits;
-{"flood": [topic, FILE.npz, hertz, seconds]} again and again; {"patch": ...} an update (by cyclonedds).
+{"flood": [topic, FILE.npz, hertz, seconds]} again and again; {"patch": ...} an update (by cyclonedds);
+{"clock": [start, seconds, hertz]} simulated time, ten times as fast as real time.
 Runs as a program of its own.
 """
 
@@ -15,6 +16,7 @@ import numpy as np
 import rclpy
 from nav_msgs.msg import OccupancyGrid
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
 
 from mapmeld.ros import dds
 
@@ -65,6 +67,16 @@ def main() -> None:
             message = message_of(path, {})
             for _ in range(int(hertz * seconds)):
                 publisher(topic).publish(message)
+                time.sleep(1 / hertz)
+        elif "clock" in task:
+            start, lasts, hertz = task["clock"]
+            for step in range(int(lasts * hertz)):
+                clock = Clock()
+                seconds, rest = divmod(start + 10 * step / hertz, 1)
+                clock.clock.sec, clock.clock.nanosec = int(seconds), int(rest * 1e9)
+                if "/clock" not in publishers:
+                    publishers["/clock"] = node.create_publisher(Clock, "/clock", 1)
+                publishers["/clock"].publish(clock)
                 time.sleep(1 / hertz)
         elif "patch" in task:
             write_patch(domain, writers, task)

@@ -4,12 +4,16 @@ import importlib.util
 import itertools
 import json
 import math
+import os
+import signal
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from drawing import cut, office, school, seen_from
 from live_system import Listener, LiveSystem, live_system, until
 
@@ -26,7 +30,9 @@ pytestmark = [
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FONG = Path(__file__).parents[2].parent / "shared/data/fong/turtlebot3_1.5_normal"
-T_1_2 = Pose2(7.377090621, -14.399254633, 0.223497389)  # examples/maps/truth.yaml
+T_1_2 = Pose2(*yaml.safe_load((EXAMPLES / "maps/truth.yaml").read_text())["transforms"]["T_1_2"])
+RIGHT = 0.3
+"""[m] At the origin of the other's frame, metres from what both mapped; SLAM has bent the maps a little."""
 
 
 def off(T: Pose2, truth: Pose2, at: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
@@ -99,7 +105,7 @@ def test_a_recording_is_replayed_and_nothing_that_is_killed_does_harm() -> None:
         matched = [T for T in (told(t, "robot_1", "robot_2") for t in listener.transforms) if T is not None]
         assert matched
         assert all(off(T, T_1_2)[0] < 0.5 and off(T, T_1_2)[1] < 5 for T in matched)
-        assert off(matched[-1], T_1_2)[0] < 0.3  # what SLAM bent the maps by
+        assert off(matched[-1], T_1_2)[0] < RIGHT
         assert never_jumped(listener.merged)
         assert all(m.frame_id == "world" for m in listener.merged)
         pair = listener.pair("robot_1", "robot_2")
@@ -132,6 +138,11 @@ def test_a_recording_is_replayed_and_nothing_that_is_killed_does_harm() -> None:
         second.kill()
         until(lambda: listener.robot("robot_2").get("stale") == "true", "robot_2 to be stale")
         assert listener.robot("robot_1")["stale"] == "false"
+        until(
+            lambda: "robot_2: stale, nobody publishes its map" in system.node.said(), "a line on the terminal"
+        )
+        for line in ("robot_1: first map, ", "robot_1: joined, x 0.00 m", "robot_2: joined, x "):
+            assert system.node.said().count(line) == 1, "said once"
         assert listener.joined() == {"robot_1", "robot_2"}
         assert shown(listener, last)
 
@@ -183,8 +194,11 @@ def test_services_and_parameters() -> None:
     from rcl_interfaces.srv import DescribeParameters
     from std_srvs.srv import Trigger
 
-    with live_system() as system:
+    with live_system("-p", "known_pose:=['robot_1 1 2 3']") as system:
         listener, robots = system.listener, system.robots()
+        until(lambda: listener.statuses, "the node")
+        (warning,) = system.node.warnings()
+        assert warning == "there is no parameter known_pose, it is not used; did you mean known_poses?"
         answer = listener.ask(Trigger, "save_map")
         assert not answer.success
         assert "no robots are joined" in answer.message
@@ -196,7 +210,12 @@ def test_services_and_parameters() -> None:
         assert answer.success, answer.message
         saved = mapmeld.load(system.folder / "merged_map.yaml")
         assert np.array_equal(saved.cells, listener.merged[-1].cells)
-        assert not listener.ask(Trigger, "save_map").success, "nothing is overwritten unasked"
+        answer = listener.ask(Trigger, "save_map")
+        assert not answer.success, "nothing is overwritten unasked"
+        assert "choose another save_path, or set save_overwrite to true" in answer.message
+        assert set_parameter(listener, "save_path", "floor_%Y") == ""
+        assert listener.ask(Trigger, "save_map").success
+        assert (system.folder / time.strftime("floor_%Y.yaml")).exists()
         assert set_parameter(listener, "save_overwrite", True) == ""
         assert listener.ask(Trigger, "save_map").success
 
@@ -288,7 +307,7 @@ def test_hostile_maps_are_warned_of_once_and_the_others_go_on() -> None:
         until(lambda: {"robot_1", "robot_2"} <= listener.joined(), "the two good robots")
         pair = pair_in_world(listener, "robot_1", "robot_2")
         assert pair is not None
-        assert off(pair, T_1_2)[0] < 0.3
+        assert off(pair, T_1_2)[0] < RIGHT
         assert not listener.joined() & {"short", "nan", "empty", "huge", "changing"}
         assert not listener.joined() & {"stranger", "flood"}
         warnings = system.node.warnings()
@@ -343,6 +362,105 @@ def test_a_robot_that_starts_anew_and_updates_of_maps() -> None:
 
         assert not arrived()
         until(arrived, "the update in the merged map")
+
+
+def test_a_matching_process_that_is_killed_is_started_again_and_nothing_is_lost() -> None:
+    """Maps that were published once, what was confirmed, forbidden and known, and the world frame."""
+    from diagnostic_msgs.srv import AddDiagnostics
+
+    maps = example_maps()
+    start = Pose2(1.3, 6.9, 0.4)
+    with live_system() as system:
+        listener, robots = system.listener, system.robots()
+        for name, grid in maps.items():
+            robots.publish(name, grid)
+        robots.publish("other", maps["robot_2"])
+        until(lambda: shown(listener, maps) and "other" in listener.joined(), "all three")
+        for service, words in (
+            ("set_known_pose", "robot_1 1.3 6.9 0.4"),
+            ("confirm_pair", "robot_1 robot_2"),
+            ("forbid_pair", "robot_1 other"),
+            ("forbid_pair", "robot_2 other"),
+        ):
+            answer = listener.ask(AddDiagnostics, service, load_namespace=words)
+            assert answer.success, answer.message
+
+        def as_told() -> bool:
+            decrees = {
+                names: listener.pair(*names).get("decree")
+                for names in (("robot_1", "robot_2"), ("other", "robot_1"), ("other", "robot_2"))
+            }
+            return (
+                listener.joined() == {"robot_1", "robot_2"}
+                and list(decrees.values()) == ["confirmed", "forbidden", "forbidden"]
+                and world(listener, "robot_1", start) < 1e-6
+                and shown(listener, maps)
+            )
+
+        until(as_told, "what was said")
+        said = len(listener.transforms)
+        for _ in range(2):
+            before = listener.figures["matching_pid"]
+            os.kill(int(before), signal.SIGKILL)
+            # It is on new maps that the node finds the process dead; these are not published again either.
+            robots.publish("other", maps["robot_2"])
+            until(another_than(before, listener), "another process")
+            until(as_told, "all as it was")
+        for transforms in listener.transforms[said:]:
+            T = told(transforms, "robot_1", "robot_2")
+            assert T is None or off(T, T_1_2)[0] < RIGHT, "never anything wrong in between"
+        warnings = [w for w in system.node.warnings() if "the matching process died" in w]
+        assert len(warnings) == 1, "said once, though it happened twice"
+        assert "Traceback" not in system.node.said()
+
+
+def another_than(pid: str, listener: Listener) -> Callable[[], bool]:
+    return lambda: listener.figures["matching_pid"] not in (pid, "")
+
+
+def test_simulated_time() -> None:
+    """Stamps are of /clock; with a clock that stands still, or none at all, maps are merged all the same."""
+    with live_system("-p", "use_sim_time:=true") as system:
+        listener, robots = system.listener, system.robots()
+        maps = example_maps()
+        for name, grid in maps.items():
+            robots.publish(name, grid)
+        until(lambda: shown(listener, maps), "the merged map, without a clock")
+        assert listener.merged[-1].stamp in (None, 0.0)
+        time_of_day = system.robots("clock")
+        time_of_day.tell(clock=[5000, 30, 20])
+        until(lambda: listener.stamp > 5000, "the clock to be heard")
+        time_of_day.kill()
+        before = len(listener.merged)
+        cells = maps["robot_1"].cells.copy()
+        cells[40:44, 40:48] = 100
+        robots.publish("robot_1", replace(maps["robot_1"], cells=cells))
+        until(lambda: len(listener.merged) > before, "another merged map, though time stands still")
+        stamp = listener.merged[-1].stamp
+        assert stamp is not None
+        assert 5000 < stamp <= 5300
+        assert listener.robot("robot_2")["stale"] == "false"
+
+
+def test_links_that_lose_packets() -> None:
+    """Reliable maps arrive though three of ten packets are lost; others once all of one comes through."""
+    maps = example_maps()
+    with live_system() as system:
+        listener = system.listener
+        lossy = {
+            "robot_1": system.lossy_robot("robot_1", 300, reliable=True),
+            "robot_2": system.lossy_robot("robot_2", 10, reliable=False),
+        }
+        ends = time.monotonic() + 60
+        while listener.joined() != set(maps) and time.monotonic() < ends:
+            for name, robot in lossy.items():
+                robot.publish(name, maps[name])
+            time.sleep(1)
+        until(lambda: shown(listener, maps), "both maps, whole")
+        pair = pair_in_world(listener, "robot_1", "robot_2")
+        assert pair is not None
+        assert off(pair, T_1_2)[0] < RIGHT
+        assert not system.node.warnings(), "half a map is no map, and nothing to warn of"
 
 
 def test_known_start_poses_without_matching_lay_maps_with_yaw_and_origins() -> None:

@@ -60,6 +60,8 @@ def test_more_tours_begin_with_the_same(place: Environment, plan: FloorPlan) -> 
 def test_shares_are_kept(place: Environment, plan: FloorPlan) -> None:
     (everything,) = plan_tours(place, 1, 1, common=0.1, share=1.0, plan=plan)
     assert set(everything.rooms) == set(range(1, int(rooms_of(place.fields).max()) + 1))
+    (little,) = plan_tours(place, 1, 1, common=0.1, share=0.1, plan=plan)
+    assert len(little.rooms) <= len(everything.rooms) / 3
 
 
 @pytest.mark.parametrize(("common", "share"), [(0.7, 0.5), (-0.1, 0.5), (0.1, 1.1)])

@@ -43,6 +43,19 @@ def reproduce(
     rooms: Annotated[
         int | None, typer.Option(metavar="N", min=0, help="Rooms to draw in each (10 if not given).")
     ] = None,
+    common: Annotated[
+        float | None,
+        typer.Option(
+            metavar="PART",
+            help="Part of the floor that all mappings of an environment drive through (0.35 if not given).",
+        ),
+    ] = None,
+    share: Annotated[
+        float | None,
+        typer.Option(
+            metavar="PART", help="Part of the floor that each mapping drives through (0.65 if not given)."
+        ),
+    ] = None,
     workers: Annotated[
         int | None,
         typer.Option(
@@ -89,6 +102,11 @@ def reproduce(
         seed=seed,
         methods=tuple(names.get(name, name) for name in method or (PAPER, DEFAULT)),
         place=place,
+    )
+    settings = replace(
+        settings,
+        common=settings.common if common is None else common,
+        share=settings.share if share is None else share,
     )
     count = workers or _cores()
     try:

@@ -38,6 +38,8 @@ def ros(
     if file is not None and not file.is_file():
         raise MapFileError.of(file, "there is no such file of parameters")
     arguments = list(context.args)
+    if arguments and arguments[0] != "--ros-args":
+        raise typer.BadParameter(f"{arguments[0]} is not known; what is for ROS itself follows --ros-args")
     if parameters or file is not None:
         arguments += ["--ros-args"] if "--ros-args" not in arguments else []
         for parameter in parameters or ():

@@ -8,6 +8,7 @@ from mapmeld.errors import MapmeldError
 from mapmeld.evaluation.score import Tolerance
 from mapmeld.matching.match import method_named
 from mapmeld.simulation.generator import Settings
+from mapmeld.simulation.tour import COMMON, SHARE
 from mapmeld.slam.parameters import GMappingParameters
 
 PAPER_METHOD = "alphabet"
@@ -56,6 +57,9 @@ class ExperimentSettings:
         over time), all others by Algorithm 1.
     place
         What kind of environments.
+    common, share
+        Parts of the floor that all mappings of an environment, and that each single one, drive through at
+        least, 0 to 1.
     slam
         How maps are made of scans.
 
@@ -72,6 +76,8 @@ class ExperimentSettings:
     seed: int = 0
     methods: tuple[str, ...] = (PAPER_METHOD, "correlative")
     place: Settings = field(default_factory=Settings)
+    common: float = COMMON
+    share: float = SHARE
     slam: GMappingParameters = SLAM
 
     def __post_init__(self) -> None:
@@ -82,6 +88,10 @@ class ExperimentSettings:
         ):
             if not low <= value <= high:
                 raise ExperimentError(f"{name} must be in {low}..{high}, not {value}")
+        if not 0 <= self.common <= self.share <= 1:
+            raise ExperimentError(
+                f"0 <= common <= share <= 1 is needed, not common {self.common:g} and share {self.share:g}"
+            )
         if not self.methods:
             raise ExperimentError("at least one method is needed")
         for name in self.methods:
@@ -107,6 +117,8 @@ class ExperimentSettings:
             "seed": self.seed,
             "methods": {name: strategy_of(name) for name in self.methods},
             "place": place,
+            "common": self.common,
+            "share": self.share,
             "slam": asdict(self.slam),
             "tolerance": str(TOLERANCE),
             "sample_seconds": SAMPLE_SECONDS,

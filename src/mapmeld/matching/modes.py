@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-import numpy as np
-
 from mapmeld.grid import OccupancyGrid
 from mapmeld.matching.result import Alternative
 from mapmeld.se2 import Pose2
@@ -22,15 +20,18 @@ def distinct_modes(best: Pose2, others: Iterable[Alternative], b: OccupancyGrid)
     within 5 degrees of one another.
     """
     rows, cols = b.shape
-    middle = b.lattice_to_metres((cols / 2, rows / 2))
+    x, y = map(float, b.lattice_to_metres((cols / 2, rows / 2)))
+    middle = Pose2(x, y)
     kept: list[Alternative] = []
+    modes = [best @ middle]
     for other in others:
-        modes = (best, *(alternative.T_a_b for alternative in kept))
-        if all(_differ(other.T_a_b, mode, middle) for mode in modes):
+        placed = other.T_a_b @ middle
+        if all(_differ(placed, mode) for mode in modes):
             kept.append(other)
+            modes.append(placed)
     return tuple(kept)
 
 
-def _differ(one: Pose2, two: Pose2, at: np.ndarray) -> bool:
-    apart = float(np.hypot(*(one.apply(at) - two.apply(at))))
-    return apart > APART_METRES or one.distance_to(two)[1] > APART_RADIANS
+def _differ(one: Pose2, two: Pose2) -> bool:
+    metres, radians = one.distance_to(two)
+    return metres > APART_METRES or radians > APART_RADIANS

@@ -14,7 +14,7 @@ from mapmeld.extras import MissingExtraError, required
 # Other middleware's descriptions of types are complained of on stderr, though they do no harm: not said.
 _QUIET = "<Tracing><Verbosity>none</Verbosity></Tracing>"
 # As rmw_cyclonedds does for ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST: the loopback, and no multicast.
-_LOOPBACK = """<General><AllowMulticast>false</AllowMulticast><Interfaces>
+LOOPBACK = """<General><AllowMulticast>false</AllowMulticast><Interfaces>
 <NetworkInterface name="lo" multicast="false" presence_required="true"/></Interfaces></General><Discovery>
 <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
 <Peers><Peer Address="127.0.0.1"/></Peers></Discovery>"""
@@ -38,7 +38,7 @@ def participant(domain_id: int) -> Any:
     """
     domain = required("cyclonedds.domain", "ros")
     if "CYCLONEDDS_URI" not in os.environ and domain_id not in _domains:
-        settings = _QUIET + (_LOOPBACK if stays_on_this_machine() else "")
+        settings = _QUIET + (LOOPBACK if stays_on_this_machine() else "")
         text = f'<CycloneDDS><Domain Id="any">{settings}</Domain></CycloneDDS>'
         _domains[domain_id] = domain.Domain(domain_id, text)  # lives as long as its participants
     return domain.DomainParticipant(domain_id)

@@ -14,11 +14,15 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 class Latencies:
-    """Durations [s] of the last calls of any function that is `timed`, and the longest ever."""
+    """Durations [s] of the last calls of any function that is `timed`, and the longest ever.
+
+    `busiest` is the longest processor time of a call: what is left of a duration without it, the
+    machine gave to others.
+    """
 
     def __init__(self, kept: int = 5000) -> None:
         self._last: deque[float] = deque(maxlen=kept)
-        self.longest = 0.0
+        self.longest = self.busiest = 0.0
         self.longest_of: dict[str, float] = {}
         self.count = 0
 
@@ -37,12 +41,13 @@ class Latencies:
 
         @wraps(function)
         def measured(*args: Any, **kwargs: Any) -> Any:
-            begun = time.perf_counter()
+            begun, busy = time.perf_counter(), time.thread_time()
             try:
                 return function(*args, **kwargs)
             finally:
                 took = time.perf_counter() - begun
                 self.add(took)
+                self.busiest = max(self.busiest, time.thread_time() - busy)
                 name = function.__name__
                 self.longest_of[name] = max(self.longest_of.get(name, 0.0), took)
 

@@ -12,13 +12,15 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 
 from mapmeld.io.recordings.messages import Patch
-from mapmeld.live import FleetSettings
+from mapmeld.live import Decree, FleetSettings, FleetState
 from mapmeld.parallel.local import one_thread_each
 from mapmeld.ros.work import Incoming, Limits, Notice, Reply, Round, Start, Wish
-from mapmeld.se2 import Pose2
 
 MAX_PATCHES = 500
 """Updates of a map that may wait; beyond it they are dropped until the next whole map."""
+
+LONGEST_PAUSE = 30.0
+"""[s] Before a process that dies again and again is started once more."""
 
 Answer = Future[tuple[bool, str]]
 
@@ -27,7 +29,8 @@ class MatchingProcess:
     """A thread that keeps one process busy with what is newest.
 
     Every method returns at once and can be called from any thread. If the process dies, another one is
-    started; it gets the maps again that were answered for before, not those on which it died.
+    started, and gets the newest maps again, and what users have said and still holds. Maps on which it dies
+    a second time are given up; it goes on with those before.
 
     Parameters
     ----------
@@ -63,7 +66,10 @@ class MatchingProcess:
         # What a new process must be told again.
         self._kept: dict[str, Incoming] = {}
         self._lasting: dict[tuple[object, ...], Wish] = {}
-        self._poses: dict[str, Pose2] = {}
+        self._state = FleetState()
+        self._unconfirmed: dict[tuple[str, str], Wish] = {}
+        self._suspects: dict[str, bytes | None] = {}  # maps on which a process died
+        self._deaths = 0  # since a process has last finished its work
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
         self._thread = threading.Thread(target=self._run, name="matching", daemon=True)
@@ -96,7 +102,9 @@ class MatchingProcess:
                 case "know", (name, *_):
                     self._lasting["know", name] = wish
                 case (("confirm" | "forbid" | "release"), (a, b)):
-                    self._lasting["pair", *sorted((str(a), str(b)))] = wish
+                    first, second = sorted((str(a), str(b)))
+                    self._lasting["pair", first, second] = wish
+                    self._unconfirmed.pop((first, second), None)
                 case "forget", (name,):
                     self._kept.pop(str(name), None)
             self._changed.notify()
@@ -182,7 +190,7 @@ class MatchingProcess:
         its.close()
         with self._changed:
             self._process, self._pipe = process, mine
-        mine.send(Start(self._settings, self._limits, self._poses))
+        mine.send(Start(self._settings, self._limits, self._state.poses))
 
     def _after(self, given: Round, reply: Reply) -> None:
         for name, incoming in given.maps.items():
@@ -191,7 +199,11 @@ class MatchingProcess:
             elif name in self._kept:
                 kept = self._kept[name]
                 self._kept[name] = replace(kept, patches=[*kept.patches, *incoming.patches][-MAX_PATCHES:])
-        self._poses = reply.state.poses
+            self._suspects.pop(name, None)
+        self._state = reply.state
+        if not reply.waiting:
+            self._deaths = 0
+        self._confirm_again(reply)
         for notice in reply.notices:
             self._on_notice(notice)
         self._on_reply(reply)
@@ -203,11 +215,17 @@ class MatchingProcess:
     def _after_death(self, given: Round, error: Exception) -> None:
         self._end()
         names = ", ".join(sorted(given.maps)) or "none"
+        given_up = [
+            name
+            for name, incoming in given.maps.items()
+            if name in self._suspects and self._suspects[name] == incoming.data
+        ]
+        lost = f"; those of {', '.join(sorted(given_up))} are given up" if given_up else ""
         self._on_notice(
             Notice(
                 "process",
-                f"the matching process died ({type(error).__name__}) on new maps of: {names}; it is started "
-                "again with the maps before",
+                f"the matching process died ({type(error).__name__}) on new maps of: {names}; "
+                f"it is started again{lost}",
             )
         )
         for wish in given.wishes:
@@ -215,16 +233,46 @@ class MatchingProcess:
                 answer = self._answers.pop(wish.number)
             answer.set_result((False, "the matching process died; ask again"))
         with self._changed:
+            for name, incoming in given.maps.items():
+                if name not in given_up:
+                    self._suspects[name] = incoming.data
+                    self._pending[name] = _together(incoming, self._pending.get(name))
             for name, kept in self._kept.items():
-                self._pending.setdefault(name, kept)
-            self._kept = {}
-            for wish in self._lasting.values():
-                if wish.kind in ("know", "forbid"):
-                    again = Wish(self._number + 1, wish.kind, wish.arguments)
-                    self._number += 1
-                    self._answers[again.number] = Future()
-                    self._wishes.append(again)
-        time.sleep(0.5)  # a process that dies at once shall not be started in a frenzy
+                self._pending[name] = _together(kept, self._pending.get(name))
+            for wish in self._still_holding():
+                self._wish_again(wish)
+            # One that dies at once shall not be started in a frenzy.
+            self._changed.wait_for(self._is_closing, min(0.5 * 2 ** min(self._deaths, 8), LONGEST_PAUSE))
+            self._deaths += 1
+
+    def _still_holding(self) -> list[Wish]:
+        """Return what users have said that had not been overtaken, as by a robot that started anew."""
+        known = {robot.name: robot.known for robot in self._state.robots}
+        decrees = {(pair.a, pair.b): pair.decree for pair in self._state.pairs}
+        holding = []
+        for (kind, *names), wish in self._lasting.items():
+            if kind == "know" and known.get(str(names[0]), True):
+                holding.append(wish)
+            elif kind == "pair":
+                decree = decrees.get((str(names[0]), str(names[1])))
+                if decree is Decree.FORBIDDEN and wish.kind == "forbid":
+                    holding.append(wish)
+                elif decree is Decree.CONFIRMED and wish.kind == "confirm":
+                    self._unconfirmed[str(names[0]), str(names[1])] = wish
+        return holding
+
+    def _confirm_again(self, reply: Reply) -> None:
+        """Confirm pairs that were confirmed before a process died, once they are matched again."""
+        for pair in reply.state.pairs:
+            if pair.T_a_b is not None and (pair.a, pair.b) in self._unconfirmed:
+                with self._changed:
+                    self._wish_again(self._unconfirmed.pop((pair.a, pair.b)))
+
+    def _wish_again(self, wish: Wish) -> None:
+        self._number += 1
+        again = Wish(self._number, wish.kind, wish.arguments)
+        self._answers[again.number] = Future()
+        self._wishes.append(again)
 
     def _end(self) -> None:
         with self._changed:
@@ -234,3 +282,12 @@ class MatchingProcess:
         if process is not None:
             process.terminate()
             process.join(timeout=5)
+
+
+def _together(older: Incoming, newer: Incoming | None) -> Incoming:
+    """Return what comes of two pieces of news of a robot: updates alone follow the map before them."""
+    if newer is None:
+        return older
+    if newer.data is not None:
+        return newer
+    return replace(older, patches=[*older.patches, *newer.patches][-MAX_PATCHES:])

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mapmeld.extras import required
 from mapmeld.grid import OccupancyGrid
 from mapmeld.io.recordings.messages import BadMessageError, Patch, grid_from_message, patch_from_message
+from mapmeld.recording import Laser
 from mapmeld.se2 import Pose2
 
 EXTRA = "ros"
@@ -125,4 +126,81 @@ def pose_array(poses: list[Pose2], frame_id: str, nanoseconds: int) -> Any:
         item = geometry.Pose()
         fill_pose(item, pose)
         message.poses.append(item)
+    return message
+
+
+def pose_stamped(pose: Pose2, frame_id: str, nanoseconds: int) -> Any:
+    """Return a geometry_msgs/PoseStamped."""
+    message = required("geometry_msgs.msg", EXTRA).PoseStamped()
+    _stamp(message.header, frame_id, nanoseconds)
+    fill_pose(message.pose, pose)
+    return message
+
+
+# ---------------------------------------------------------------------- robots
+def clock_message(nanoseconds: int) -> Any:
+    """Return a rosgraph_msgs/Clock."""
+    message = required("rosgraph_msgs.msg", EXTRA).Clock()
+    message.clock.sec, message.clock.nanosec = split_time(nanoseconds)
+    return message
+
+
+def odometry_message(
+    pose: Pose2,
+    speed: tuple[float, float],
+    covariance: NDArray[np.float64],
+    frames: tuple[str, str],
+    nanoseconds: int,
+) -> Any:
+    """Return a nav_msgs/Odometry.
+
+    Parameters
+    ----------
+    pose, speed
+        Of the base: where odometry believes it to be, and [m/s] ahead and [rad/s].
+    covariance
+        (36,), of the pose and of the speed.
+    frames
+        Of odometry, and of the base.
+    nanoseconds
+        The stamp.
+    """
+    message = required("nav_msgs.msg", EXTRA).Odometry()
+    _stamp(message.header, frames[0], nanoseconds)
+    message.child_frame_id = frames[1]
+    fill_pose(message.pose.pose, pose)
+    message.twist.twist.linear.x, message.twist.twist.angular.z = speed
+    message.pose.covariance = message.twist.covariance = covariance
+    return message
+
+
+def scan_message(
+    laser: Laser,
+    ranges: NDArray[np.float32],
+    limits: tuple[float, float],
+    frame_id: str,
+    nanoseconds: int,
+) -> Any:
+    """Return a sensor_msgs/LaserScan.
+
+    Parameters
+    ----------
+    laser
+        The scanner.
+    ranges
+        (beams,) [m]
+    limits
+        The shortest range that it measures [m], and the time from scan to scan [s].
+    frame_id
+        Of the laser.
+    nanoseconds
+        The stamp.
+    """
+    message = required("sensor_msgs.msg", EXTRA).LaserScan()
+    _stamp(message.header, frame_id, nanoseconds)
+    message.angle_min, message.angle_increment = laser.first_angle, laser.step
+    message.angle_max = laser.first_angle + (laser.beams - 1) * laser.step
+    message.range_min, message.scan_time = limits
+    message.range_max = laser.max_range
+    message.ranges = array.array("f", ranges.astype(np.float32).tobytes())
     return message

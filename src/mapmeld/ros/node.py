@@ -6,6 +6,7 @@ Callbacks only move bytes; maps are taken apart, matched, drawn and put together
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import threading
 import time
@@ -22,6 +23,7 @@ from mapmeld.ros.latency import Latencies
 from mapmeld.ros.listening import Heard
 from mapmeld.ros.matching_process import Answer, MatchingProcess
 from mapmeld.ros.messages import pose_array, pose_with_covariance
+from mapmeld.ros.news import news
 from mapmeld.ros.parameters import (
     PARAMETERS,
     ParameterError,
@@ -31,6 +33,7 @@ from mapmeld.ros.parameters import (
     pose_in_words,
     robot_names,
     two_robots,
+    unknown,
 )
 from mapmeld.ros.status import diagnostic_array, items_of
 from mapmeld.ros.throttle import Throttle
@@ -63,6 +66,7 @@ class MergingNode:
         self._start_poses: dict[str, Any] = {}
         self._once_joined: set[str] = set()
         self._told: Any = None
+        self._logged: tuple[FleetState, dict[str, str]] = (self._state, {})
         self._publishing = threading.Lock()
         self._given_poses: dict[str, Any] = {}
         self._values = self._declared(list(robots))
@@ -77,7 +81,7 @@ class MergingNode:
         self._poses = node.create_publisher(geometry.PoseArray, "~/start_poses", latched)
         self._status = node.create_publisher(diagnostics, "~/status", latched)
         self._diagnostics = node.create_publisher(diagnostics, "/diagnostics", 10)
-        self._transforms = static_transforms(node, latched)
+        self._transforms = static_transforms(node)
         if self._transforms is None:
             self._say("tf", "no transforms on /tf_static: neither tf2_msgs nor cyclonedds can be imported")
         self._update_type = listening.system_updates()
@@ -138,6 +142,10 @@ class MergingNode:
                 ]
             default = robots if name == "robots" else about.default
             values[name] = _plain(self.node.declare_parameter(name, default, descriptor).value)
+        # ROS itself passes over what a node does not declare.
+        given = _given_parameters(self.node)
+        for sentence in unknown(name for name in given if not self.node.has_parameter(name)):
+            self.node.get_logger().warning(sentence)
         return values
 
     def _on_parameters(self, parameters: Any) -> Any:
@@ -342,15 +350,20 @@ class MergingNode:
             "callbacks": str(self._latencies.count),
             "callback_ms_99": f"{1e3 * self._latencies.percentile(99):.2f}",
             "callback_ms_max": f"{1e3 * self._latencies.longest:.2f}",
+            "callback_cpu_ms_max": f"{1e3 * self._latencies.busiest:.2f}",
             "callback_ms_max_of": " ".join(
                 f"{name.strip('_<>')}={1e3 * s:.1f}" for name, s in self._latencies.longest_of.items()
             ),
             "late_ms_99": f"{1e3 * self._lateness.percentile(99):.2f}",
             "late_ms_max": f"{1e3 * self._lateness.longest:.2f}",
         }
-        items = items_of(state, self._stale(), list(self._heard), figures)
+        stale = self._stale()
+        items = items_of(state, stale, list(self._heard), figures)
         message = diagnostic_array(items, self._now())
         with self._publishing:
+            for sentence in news(self._logged[0], state, self._logged[1], stale):
+                self.node.get_logger().info(sentence)
+            self._logged = state, stale
             self._status.publish(message)
             self._diagnostics.publish(message)
 
@@ -391,7 +404,7 @@ class MergingNode:
         return handle
 
     async def _save(self, _: Any, response: Any) -> Any:
-        path, overwrite = self._values["save_path"], self._values["save_overwrite"]
+        path, overwrite = time.strftime(self._values["save_path"]), self._values["save_overwrite"]
         return await self._answered(self.matching.wish("save", path, overwrite), response)
 
     async def _reset(self, _: Any, response: Any) -> Any:
@@ -408,6 +421,11 @@ class MergingNode:
         answer.add_done_callback(resume)
         response.success, response.message = await future
         return response
+
+
+def _given_parameters(node: Any) -> dict[str, Any]:
+    """Return what was given on the command line and in files, for which rclpy has no public name."""
+    return dict(getattr(node, "_parameter_overrides", {}))
 
 
 def _plain(value: Any) -> Any:
@@ -437,9 +455,18 @@ def run(robots: Sequence[str] = ("auto",), ros_arguments: Sequence[str] = (), na
     executors, external = required("rclpy.executors", "ros"), rclpy.exceptions
     if importlib.util.find_spec("tf2_msgs") is None:
         dds.prepare_fastdds()
-    rclpy.init(args=["mapmeld", *ros_arguments])
     try:
-        _spin(rclpy.create_node(name), robots, executors)
+        rclpy.init(args=["mapmeld", *ros_arguments])
+    except RuntimeError as error:  # rclpy's own, which have no public name
+        raise ParameterError(f"ROS does not take its arguments: {str(error).splitlines()[0]}") from error
+    try:
+        node = rclpy.create_node(name)
+        # ROS itself passes over sections of other nodes; that there is none for this one is a slip.
+        if "--params-file" in ros_arguments and not _given_parameters(node):
+            node.get_logger().warning(
+                f"no parameter in the file is for this node, whose section is {node.get_name()}:"
+            )
+        _spin(node, robots, executors)
     except (external.InvalidParameterTypeException, external.InvalidParameterValueException) as error:
         raise ParameterError(str(error)) from error
     except (executors.ExternalShutdownException, KeyboardInterrupt):
@@ -457,6 +484,9 @@ def _spin(node: Any, robots: Sequence[str], executors: Any) -> None:
         try:
             executor = executors.SingleThreadedExecutor()
             executor.add_node(node)
+            # A collection of all that the start has left would hold a callback up for up to 0.1 s.
+            gc.collect()
+            gc.freeze()
             executor.spin()
         finally:
             merging.close()

@@ -6,8 +6,9 @@ Names that users of multirobot_map_merge know are theirs, where the meaning is t
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any
 
 from mapmeld.errors import MapmeldError
@@ -70,9 +71,22 @@ PARAMETERS: Mapping[str, Described] = {
         "colour", "What a cell becomes that several maps know (docs: colour, log-odds, ...)."
     ),
     "publish_tf": Described(True, "Whether world -> map of each robot is published on /tf_static."),
-    "save_path": Described("merged_map", "Where save_map writes: PATH.yaml and PATH.pgm."),
+    "save_path": Described(
+        "merged_map", "Where save_map writes: PATH.yaml and PATH.pgm; %Y %m %d %H %M %S are the time."
+    ),
     "save_overwrite": Described(False, "Whether save_map replaces files."),
 }
+
+
+def unknown(names: Iterable[str]) -> list[str]:
+    """Return a sentence for each of these names of parameters, which the node does not have."""
+    sentences = []
+    for name in names:
+        if not name.startswith("qos_overrides."):  # ROS's own, for the topics that a node lets it change
+            near = get_close_matches(name, PARAMETERS, 1, cutoff=0.7)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            sentences.append(f"there is no parameter {name}, it is not used{hint}")
+    return sentences
 
 
 def fleet_settings(values: Mapping[str, Any]) -> FleetSettings:

@@ -85,10 +85,7 @@ def _pair(pair: PairReport) -> Item:
         **_pose("T_a_b", pair.T_a_b),
     }
     level = OK if pair.state in ("used", "settled") else WARN
-    probability = "" if pair.probability is None else f", probability {pair.probability:.3f}"
-    return Item(
-        f"mapmeld pair: {pair.a} {pair.b}", level, f"{pair.standing}{probability}: {pair.why}", values
-    )
+    return Item(f"mapmeld pair: {pair.a} {pair.b}", level, f"{pair.standing}: {pair.why}", values)
 
 
 def _pose(name: str, pose: Pose2 | None) -> dict[str, str]:

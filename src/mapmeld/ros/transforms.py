@@ -1,4 +1,4 @@
-"""Static transforms on ``/tf_static``: by the ROS installation's tf2_msgs, or else by `cyclonedds`."""
+"""Transforms on ``/tf_static`` and ``/tf``: by the ROS installation's tf2_msgs, or else by `cyclonedds`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, Protocol
 from mapmeld.extras import MissingExtraError, required
 from mapmeld.live import FleetState
 from mapmeld.ros import dds
+from mapmeld.ros.listening import profile
 from mapmeld.ros.messages import quaternion, split_time
 from mapmeld.se2 import Pose2
 
@@ -21,33 +22,43 @@ A static transform cannot be taken back; but a frame that gets another parent le
 """
 
 
-class StaticTransforms(Protocol):
-    """Publishes all static transforms of the node at once, latched."""
+class TransformPublisher(Protocol):
+    """Publishes transforms on one topic."""
 
     by: str
 
     def send(self, transforms: Transforms, nanoseconds: int) -> None:
-        """Publish them; those that were sent before and are not among these are forgotten by late joiners."""
+        """Publish them together; where the topic is latched, late joiners get those that were sent last."""
 
     def close(self) -> None:
         """Leave."""
 
 
-def static_transforms(node: Any, latched: Any) -> StaticTransforms | None:
-    """Return what can publish them: None if there is neither tf2_msgs nor cyclonedds."""
+def static_transforms(node: Any) -> TransformPublisher | None:
+    """Return what publishes on ``/tf_static``: None if there is neither tf2_msgs nor cyclonedds."""
+    return _publisher(node, "/tf_static", latched=True)
+
+
+def moving_transforms(node: Any) -> TransformPublisher | None:
+    """Return what publishes on ``/tf``; None as `static_transforms`."""
+    return _publisher(node, "/tf", latched=False)
+
+
+def _publisher(node: Any, topic: str, *, latched: bool) -> TransformPublisher | None:
     try:
-        return _BySystem(node, required("tf2_msgs.msg", "ros"), latched)
+        return _BySystem(node, required("tf2_msgs.msg", "ros"), topic, latched=latched)
     except MissingExtraError:
         pass
-    return _ByCyclone(node.context.get_domain_id()) if dds.available() else None
+    return _ByCyclone(node.context.get_domain_id(), topic, latched=latched) if dds.available() else None
 
 
 class _BySystem:
     by = "tf2_msgs"
 
-    def __init__(self, node: Any, messages: Any, latched: Any) -> None:
+    def __init__(self, node: Any, messages: Any, topic: str, *, latched: bool) -> None:
         self._messages = messages
-        self._publisher = node.create_publisher(messages.TFMessage, "/tf_static", latched)
+        quality = profile(reliable=True, latched=latched, depth=1 if latched else 100)
+        self._publisher = node.create_publisher(messages.TFMessage, topic, quality)
 
     def send(self, transforms: Transforms, nanoseconds: int) -> None:
         stamped = required("geometry_msgs.msg", "ros").TransformStamped
@@ -69,15 +80,15 @@ class _BySystem:
 class _ByCyclone:
     by = "cyclonedds"
 
-    def __init__(self, domain_id: int) -> None:
+    def __init__(self, domain_id: int, topic: str, *, latched: bool) -> None:
         from mapmeld.ros import dds_types
 
-        quality = dds.quality(latched=True)
+        quality = dds.quality(latched=latched)
         participant = dds.participant(domain_id)
         topics, publishing = required("cyclonedds.topic", "ros"), required("cyclonedds.pub", "ros")
-        topic = topics.Topic(participant, "rt/tf_static", dds_types.TFMessage, qos=quality)
+        on = topics.Topic(participant, f"rt{topic}", dds_types.TFMessage, qos=quality)
         self._message = dds_types.tf_message
-        self._writer = publishing.DataWriter(participant, topic, qos=quality)
+        self._writer = publishing.DataWriter(participant, on, qos=quality)
 
     def send(self, transforms: Transforms, nanoseconds: int) -> None:
         self._writer.write(self._message(transforms, nanoseconds))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from mapmeld.errors import MapmeldError
 from mapmeld.grid import OccupancyGrid
-from mapmeld.io import save
+from mapmeld.io import MapFileError, save
 from mapmeld.io.recordings.messages import BadMessageError, Patch, patched
 from mapmeld.live import Fleet
 from mapmeld.merging.graph import KnownPose
@@ -180,7 +180,11 @@ class Wishes:
         if merged is None or not self._fleet.state().poses:
             raise BadMessageError("no robots are joined: there is no merged map to save")
         target = Path(path if path.endswith(".yaml") else f"{path}.yaml").expanduser().resolve()
-        save(merged, target, force=overwrite)
+        try:
+            save(merged, target, force=overwrite)
+        except MapFileError as error:  # as the user of a node can follow it
+            advice = "another name, or force=True", "another save_path, or set save_overwrite to true"
+            raise BadMessageError(str(error).replace(*advice)) from error
         return f"saved as {target}"
 
 

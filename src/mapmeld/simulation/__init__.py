@@ -4,6 +4,7 @@ Environments need no extra; `World` needs MuJoCo, recordings need mcap and rosba
 """
 
 from mapmeld.simulation.boxes import Box
+from mapmeld.simulation.commanded import CommandedDriver
 from mapmeld.simulation.driving import STOP, TICK, Command, Driver, Moment, Sight, drive
 from mapmeld.simulation.environment import Environment, Furniture, Kind
 from mapmeld.simulation.errors import SimulationError
@@ -34,6 +35,7 @@ __all__ = [
     "Box",
     "Command",
     "CommandLogDriver",
+    "CommandedDriver",
     "Configuration",
     "Driver",
     "Environment",

@@ -19,16 +19,18 @@ from mapmeld.io.atomic import whole_file
 from mapmeld.se2 import Pose2
 from mapmeld.simulation.driving import Command, Moment
 from mapmeld.simulation.robot import Robot
+from mapmeld.simulation.robot_topics import (
+    BASE,
+    LASER,
+    MAP,
+    ODOM,
+    WORLD,
+    RobotTopics,
+    odometry_covariance,
+    robot_names,
+)
 
 EXTRA = "sim"
-
-WORLD, MAP, ODOM, BASE, LASER = "world", "map", "odom", "base_link", "laser"
-"""Frames. Those of several robots have the robot's name and a slash before them, the world has not."""
-
-# Of what odometry says, as its publishers usually state it; a simulated robot does not know its slip either.
-_POSE_VARIANCES = (1e-3, 1e-3, 1e-2)  # x, y [m^2], yaw [rad^2]
-_TWIST_VARIANCES = (1e-3, 1e-3, 1e-2)
-_UNUSED_VARIANCE = 1e6  # of z, roll and pitch
 
 # Durations of "for ever", as rosbag2 writes them.
 _QOS = """\
@@ -44,11 +46,6 @@ _QOS = """\
 """
 _VOLATILE = _QOS.format(history=1, depth=10, durability=2)
 _LATCHED = _QOS.format(history=1, depth=1, durability=1)
-
-
-def robot_names(count: int) -> tuple[str, ...]:
-    """Return the names of the robots of a recording: none for a single one."""
-    return ("",) if count == 1 else tuple(f"robot_{i + 1}" for i in range(count))
 
 
 @contextmanager
@@ -86,7 +83,7 @@ class RecordingWriter:
     """
 
     def __init__(self, file: BinaryIO, writing: Any, build: Robot, names: Sequence[str]) -> None:
-        self._names, self._build = tuple(names), build
+        self._robots, self._build = RobotTopics(names), build
         self._store = _store()
         self._kinds = self._store.types
         self._writer = writing.Writer(file, compression=writing.CompressionType.ZSTD)
@@ -94,13 +91,14 @@ class RecordingWriter:
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._said: dict[int, Command] = {}
-        self._before: dict[int, tuple[float, Pose2]] = {}
         self.scans = self.maps = 0
         T_base_laser = build.laser.T_base_laser
         height = build.laser_height
         transforms = [
-            self._transform(0.0, self._frame(i, BASE), self._frame(i, LASER), T_base_laser, height)
-            for i in range(len(self._names))
+            self._transform(
+                0.0, self._robots.frame(i, BASE), self._robots.frame(i, LASER), T_base_laser, height
+            )
+            for i in range(len(self._robots.names))
         ]
         self._write("/tf_static", "tf2_msgs/msg/TFMessage", 0.0, _LATCHED, transforms=transforms)
 
@@ -112,24 +110,24 @@ class RecordingWriter:
     def add(self, moment: Moment) -> None:
         """Write all that there is to record of a moment."""
         robot, stamp = moment.robot, moment.stamp
-        odom, base = self._frame(robot, ODOM), self._frame(robot, BASE)
+        odom, base = self._robots.frame(robot, ODOM), self._robots.frame(robot, BASE)
         self._write(
-            self._topic(robot, "ground_truth"), "geometry_msgs/msg/PoseStamped", stamp, _VOLATILE,
+            self._robots.topic(robot, "ground_truth"), "geometry_msgs/msg/PoseStamped", stamp, _VOLATILE,
             header=self._header(stamp, WORLD), pose=self._pose(moment.T_world_base),
         )  # fmt: skip
         self._write(
             "/tf", "tf2_msgs/msg/TFMessage", stamp, _VOLATILE,
             transforms=[self._transform(stamp, odom, base, moment.T_odom_base)],
         )  # fmt: skip
-        v, w = self._speed(robot, stamp, moment.T_odom_base)
+        v, w = self._robots.speed(robot, stamp, moment.T_odom_base)
         self._write(
-            self._topic(robot, "odom"), "nav_msgs/msg/Odometry", stamp, _VOLATILE,
+            self._robots.topic(robot, "odom"), "nav_msgs/msg/Odometry", stamp, _VOLATILE,
             header=self._header(stamp, odom), child_frame_id=base,
             pose=self._kind("geometry_msgs/msg/PoseWithCovariance")(
-                pose=self._pose(moment.T_odom_base), covariance=_covariance(*_POSE_VARIANCES)
+                pose=self._pose(moment.T_odom_base), covariance=odometry_covariance()
             ),
             twist=self._kind("geometry_msgs/msg/TwistWithCovariance")(
-                twist=self._twist(v, w), covariance=_covariance(*_TWIST_VARIANCES)
+                twist=self._twist(v, w), covariance=odometry_covariance()
             ),
         )  # fmt: skip
         if moment.scan is not None:
@@ -138,13 +136,13 @@ class RecordingWriter:
             self._said[robot] = moment.command
             twist = self._twist(*moment.command)
             self._write(
-                self._topic(robot, "cmd_vel"), "geometry_msgs/msg/Twist", stamp, _VOLATILE,
+                self._robots.topic(robot, "cmd_vel"), "geometry_msgs/msg/Twist", stamp, _VOLATILE,
                 linear=twist.linear, angular=twist.angular,
             )  # fmt: skip
 
     def add_map_frame(self, robot: int, stamp: float, T_map_odom: Pose2) -> None:
         """Write where SLAM believes odometry's frame to lie in the map's."""
-        frames = self._frame(robot, MAP), self._frame(robot, ODOM)
+        frames = self._robots.frame(robot, MAP), self._robots.frame(robot, ODOM)
         self._write(
             "/tf", "tf2_msgs/msg/TFMessage", stamp, _VOLATILE,
             transforms=[self._transform(stamp, *frames, T_map_odom)],
@@ -162,8 +160,8 @@ class RecordingWriter:
             origin=self._pose(grid.origin),
         )  # fmt: skip
         self._write(
-            self._topic(robot, "map"), "nav_msgs/msg/OccupancyGrid", stamp, _LATCHED,
-            header=self._header(made, grid.frame_id or self._frame(robot, MAP)), info=info,
+            self._robots.topic(robot, "map"), "nav_msgs/msg/OccupancyGrid", stamp, _LATCHED,
+            header=self._header(made, grid.frame_id or self._robots.frame(robot, MAP)), info=info,
             data=grid.cells.reshape(-1),
         )  # fmt: skip
         self.maps += 1
@@ -171,8 +169,8 @@ class RecordingWriter:
     def _scan(self, robot: int, stamp: float, ranges: NDArray[np.float32]) -> None:
         laser = self._build.laser
         self._write(
-            self._topic(robot, "scan"), "sensor_msgs/msg/LaserScan", stamp, _VOLATILE,
-            header=self._header(stamp, self._frame(robot, LASER)),
+            self._robots.topic(robot, "scan"), "sensor_msgs/msg/LaserScan", stamp, _VOLATILE,
+            header=self._header(stamp, self._robots.frame(robot, LASER)),
             angle_min=laser.first_angle, angle_max=laser.first_angle + (laser.beams - 1) * laser.step,
             angle_increment=laser.step, time_increment=0.0, scan_time=1 / self._build.scan_rate,
             range_min=self._build.min_range, range_max=laser.max_range,
@@ -180,22 +178,7 @@ class RecordingWriter:
         )  # fmt: skip
         self.scans += 1
 
-    def _speed(self, robot: int, stamp: float, pose: Pose2) -> tuple[float, float]:
-        """Return speed and turn rate by odometry since the moment before."""
-        then, before = self._before.get(robot, (stamp, pose))
-        self._before[robot] = stamp, pose
-        if stamp <= then:
-            return 0.0, 0.0
-        moved = before.inverse() @ pose
-        return moved.x / (stamp - then), moved.theta / (stamp - then)
-
     # ------------------------------------------------------------------ messages
-    def _topic(self, robot: int, name: str) -> str:
-        return "/" + "/".join(part for part in (self._names[robot], name) if part)
-
-    def _frame(self, robot: int, name: str) -> str:
-        return "/".join(part for part in (self._names[robot], name) if part)
-
     def _kind(self, name: str) -> Any:
         return self._kinds[name]
 
@@ -290,11 +273,6 @@ def read_drive(path: AnyPath) -> tuple[Pose2, tuple[tuple[float, Command], ...]]
     if start is None or not commands:
         raise MapFileError.of(path, "has no topics /ground_truth and /cmd_vel, so it is no route")
     return start, tuple(commands)
-
-
-def _covariance(x: float, y: float, yaw: float) -> NDArray[np.float64]:
-    diagonal = (x, y, _UNUSED_VARIANCE, _UNUSED_VARIANCE, _UNUSED_VARIANCE, yaw)
-    return np.diag(diagonal).reshape(-1)
 
 
 @functools.cache

@@ -97,8 +97,8 @@ def plan_tours(
     """Plan the mappings of one environment.
 
     All of them visit the same connected rooms, at least `common` of the floor; each visits further
-    rooms, its own choice, up to at least `share` of it and half of all rooms. Starts differ in place
-    and heading. The same seed gives the same tours; more of them begin with the same ones.
+    rooms, its own choice, up to at least `share` of it and that share of all rooms, or half of them. Starts
+    differ in place and heading. The same seed gives the same tours; more of them begin with the same ones.
 
     Parameters
     ----------
@@ -135,7 +135,8 @@ def plan_tours(
     tours: list[Tour] = []
     for index in range(count):
         rng = np.random.default_rng((seed, 3, index))
-        chosen = _grown(plan, shared, set(views), share, math.ceil(len(views) / 2), rng)
+        # Few large rooms may be much of the floor already: half of all rooms, where as much is asked for.
+        chosen = _grown(plan, shared, set(views), share, math.ceil(len(views) * min(share, 0.5)), rng)
         here = nodes[np.isin(rooms, sorted(chosen))]
         start = _start(here, [tour.start for tour in tours], rng)
         stops = np.concatenate([views[room] for room in sorted(chosen)])

@@ -95,7 +95,15 @@ def _place(settings: ExperimentSettings, environment: int) -> tuple[Environment,
     seed = settings.environment_seed(environment)
     place = generate(settings.place, seed)
     plan = FloorPlan(place)
-    return place, plan, list(plan_tours(place, settings.mappings, seed, plan=plan))
+    return (
+        place,
+        plan,
+        list(
+            plan_tours(
+                place, settings.mappings, seed, common=settings.common, share=settings.share, plan=plan
+            )
+        ),
+    )
 
 
 def _driven(

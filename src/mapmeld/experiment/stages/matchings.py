@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 from mapmeld.evaluation.score import Tolerance, accuracy, overlap_centroid, pose_errors
@@ -12,7 +15,7 @@ from mapmeld.experiment.rows import MatchingRow
 from mapmeld.experiment.settings import SAMPLE_SECONDS, TOLERANCE, strategy_of
 from mapmeld.experiment.stages.mapped import Mapped, errors_of, is_right, mapped, numbers, true_environment
 from mapmeld.experiment.stages.mappings import HISTORY
-from mapmeld.grid import overlap_share
+from mapmeld.grid import OccupancyGrid, overlap_share
 from mapmeld.history import Standing, Step, follow
 from mapmeld.io.history import read_history
 from mapmeld.matching.match import checked_parameters, method_named
@@ -35,9 +38,7 @@ def match_histories(root: Path, environment: int, mapping_1: int, mapping_2: int
     over_time: list[tuple[float, bool, float | None]] = []
     right_since: float | None = None
     step: Step | None = None
-    first, second = (
-        read_history(mapping_folder(root, environment, n) / HISTORY) for n in (mapping_1, mapping_2)
-    )
+    first, second = (_states(root, environment, number) for number in (mapping_1, mapping_2))
     for step in follow(first, second, method=method, strategy=strategy_of(method)):
         steps += 1
         if step.best is None or step.best.T_a_b is None or step.stamp is None or centroid is None:
@@ -76,6 +77,17 @@ def match_histories(root: Path, environment: int, mapping_1: int, mapping_2: int
         over_time=tuple(over_time),
         seconds=time.process_time() - began,
     )
+
+
+def _states(root: Path, environment: int, mapping: int) -> Iterator[OccupancyGrid]:
+    # Copies: what is computed of a map is kept as long as the map, and that is much for all of a history.
+    return (replace(state) for state in _history(root, environment, mapping))
+
+
+@lru_cache(maxsize=5)
+def _history(root: Path, environment: int, mapping: int) -> tuple[OccupancyGrid, ...]:
+    """Read a history, which all matchings of its environment need."""
+    return tuple(read_history(mapping_folder(root, environment, mapping) / HISTORY))
 
 
 def _accuracy_now(root: Path, environment: int, one: Mapped, step: Step) -> float | None:

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from mapmeld.matching.alphabet.letters import ROUNDING, Alphabet
 
@@ -118,6 +117,8 @@ def _count_relations_used_twice(one: Alphabet, two: Alphabet, epsilon: float, nu
     distance[two.letter, two.other] = two.distance_px
     bearing[two.letter, two.other] = two.bearing
     reach = 2 * epsilon + nu * float(two.distance_px.max())
+    from scipy.spatial import KDTree  # takes longer to import than most matches take
+
     k, q = KDTree(two.corners_px).query_pairs(reach, output_type="ndarray").T
     turn = np.abs((bearing[:, k] - bearing[:, q] + np.pi) % _TURN - np.pi)
     z, twin = np.nonzero((np.abs(distance[:, k] - distance[:, q]) <= 2 * epsilon) & (turn <= nu))

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from mapmeld.grid import OccupancyGrid
 from mapmeld.matching.baselines.evidence import Evidence, Points, rejected
@@ -95,7 +94,7 @@ def magnitudes_by_direction(walls_px: Points, size: int, directions: int) -> Pla
     (directions, radii) array, the mean of every radius taken out.
     """
     size *= _PADDING
-    magnitude = np.log1p(np.abs(fft.fftshift(fft.fft2(drawn_walls(walls_px, size)))))
+    magnitude = np.log1p(np.abs(np.fft.fftshift(np.fft.fft2(drawn_walls(walls_px, size)))))
     theta = np.arange(directions)[:, None] * (np.pi / directions)
     radius = np.arange(max(1, round(_RING[0] * size)), max(3, round(_RING[1] * size)), _PADDING)[None, :]
     middle = size // 2
@@ -115,8 +114,8 @@ def rotations(polar_1: Plane, polar_2: Plane, peaks: int) -> list[float]:
     would be a scale.
     """
     n = len(polar_1)
-    cross = fft.rfft(polar_1, axis=0) * np.conj(fft.rfft(polar_2, axis=0))
-    correlation = fft.irfft((cross / (np.abs(cross) + 1e-9)).sum(axis=1), n)
+    cross = np.fft.rfft(polar_1, axis=0) * np.conj(np.fft.rfft(polar_2, axis=0))
+    correlation = np.fft.irfft((cross / (np.abs(cross) + 1e-9)).sum(axis=1), n)
     apart = max(1, round(n * _PEAKS_APART_DEG / 180))
     return [
         refined_peak(correlation, k) * math.pi / n % math.pi
@@ -151,8 +150,8 @@ class Translations:
     def __init__(self, walls_1_px: Points, size: int) -> None:
         """Transform map 1; `size` [px], even, must hold both maps side by side: nothing wraps around."""
         self._size = size
-        self._transform_1 = fft.rfft2(drawn_walls(walls_1_px, size))
-        blur = np.exp(-2 * (np.pi * _BLUR_PX * fft.fftfreq(size)) ** 2).astype(np.float32)
+        self._transform_1 = np.fft.rfft2(drawn_walls(walls_1_px, size))
+        blur = np.exp(-2 * (np.pi * _BLUR_PX * np.fft.fftfreq(size)) ** 2).astype(np.float32)
         self._blur = blur[:, None] * blur[None, : size // 2 + 1]
         self._full_height = float(blur.mean()) ** 2
 
@@ -162,9 +161,9 @@ class Translations:
         The height is 1 for two pictures that are equal but for a translation by whole pixels.
         """
         n = self._size
-        cross = self._transform_1 * np.conj(fft.rfft2(drawn_walls(walls_2_px, n)))
+        cross = self._transform_1 * np.conj(np.fft.rfft2(drawn_walls(walls_2_px, n)))
         cross *= self._blur / (np.abs(cross) + np.float32(1e-6))
-        correlation = fft.irfft2(cross, (n, n))
+        correlation = np.fft.irfft2(cross, (n, n))
         row, col = divmod(int(np.argmax(correlation)), n)
         x, y = refined_peak(correlation[row], col), refined_peak(correlation[:, col], row)
         height = float(correlation[row, col]) / self._full_height
@@ -220,4 +219,4 @@ def match_fourier_mellin(
 
 def _even_fast_length(least_px: float) -> int:
     """Return an even length that the fast Fourier transform likes, at least `least_px`."""
-    return 2 * int(fft.next_fast_len(math.ceil(least_px / 2), real=True))
+    return 2 * int(cv2.getOptimalDFTSize(math.ceil(least_px / 2)))

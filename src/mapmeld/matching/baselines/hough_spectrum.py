@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from mapmeld.grid import OccupancyGrid
 from mapmeld.matching.baselines.evidence import Evidence, Points, rejected
@@ -73,8 +73,8 @@ def rotations(spectrum_1: Spectrum, spectrum_2: Spectrum, peaks: int) -> list[fl
     Both spectra (directions,) are correlated about their means.
     """
     n = len(spectrum_1)
-    one, two = (fft.rfft(s - s.mean()) for s in (spectrum_1, spectrum_2))
-    correlation = fft.irfft(one * np.conj(two), n)
+    one, two = (np.fft.rfft(s - s.mean()) for s in (spectrum_1, spectrum_2))
+    correlation = np.fft.irfft(one * np.conj(two), n)
     apart = max(1, round(n * _PEAKS_APART_DEG / 180))
     return [
         refined_peak(correlation, k) * math.pi / n % math.pi
@@ -91,8 +91,8 @@ def offset_along(positions_1: NDArray[np.float64], positions_2: NDArray[np.float
     low_1, low_2 = math.floor(positions_1.min()), math.floor(positions_2.min())
     one = np.bincount((positions_1 - low_1).astype(np.intp)).astype(np.float64)
     two = np.bincount((positions_2 - low_2).astype(np.intp)).astype(np.float64)
-    size = fft.next_fast_len(len(one) + len(two), real=True)
-    correlation = fft.irfft(fft.rfft(one, size) * np.conj(fft.rfft(two, size)), size)
+    size = cv2.getOptimalDFTSize(len(one) + len(two))
+    correlation = np.fft.irfft(np.fft.rfft(one, size) * np.conj(np.fft.rfft(two, size)), size)
     shift = refined_peak(correlation, int(np.argmax(correlation)))
     if shift > len(one):
         shift -= size
