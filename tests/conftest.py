@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import signal
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,11 @@ if TYPE_CHECKING:
 # Machines that run the tests are slow at times; time is measured in benchmarks/, not here.
 settings.register_profile("mapmeld", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("mapmeld")
+
+# What started the tests may ignore these (nohup, a shell's `&`), and programs under test would inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+if hasattr(signal, "SIGHUP"):
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 _metres = st.floats(-100, 100, allow_nan=False)
 st.register_type_strategy(
