@@ -29,7 +29,7 @@ from mapmeld.io.images import open_regular
 
 MAGIC = b"mapmeld index 2\n"
 MAX_BYTES = 1 << 32
-"""Largest file that is read; a map takes about 6 KB."""
+"""Largest file that is read; a map takes about 4 KB."""
 
 
 def write_index(index: MapIndex, path: Path) -> None:
@@ -137,6 +137,7 @@ def _whole(value: object) -> int:
 def _text(value: object) -> str:
     if not isinstance(value, str) or "\0" in value:
         raise ValueError("a name that is none")
+    value.encode()  # lone surrogates are no text
     return value
 
 

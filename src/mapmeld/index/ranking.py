@@ -69,7 +69,8 @@ class Ranking:
         found = np.zeros(self.count)
         for word, weight in zip(words, value * rarity / (length or 1.0), strict=True):
             found += weight * self.weights[word]
-        return np.asarray(found / np.where(self.lengths > 0, self.lengths, np.inf))
+        # At most 1 by its nature; a forged file may say otherwise.
+        return np.minimum(found / np.where(self.lengths > 0, self.lengths, np.inf), 1.0)
 
     def best(self, signature: Signature) -> tuple[Index, Doubles]:
         """Return the numbers of the signatures with words in common with this one, and scores, best first."""
