@@ -66,6 +66,16 @@ def test_json_has_the_transform_into_each_map(archive: Path) -> None:
     assert {c["match"] for c in only["candidates"]} == {None}
 
 
+def test_if_no_candidate_can_be_read_that_is_no_answer(archive: Path) -> None:
+    assert run("index", archive).code == 0
+    for image in archive.glob("*.pgm"):
+        if image.stem != "a":
+            image.unlink()
+    outcome = run("find", archive / "a.yaml", "--in", archive / "mapmeld.index")
+    assert outcome.code == 2
+    assert "no map that looks like" in outcome.err.splitlines()[-1]
+
+
 def test_maps_that_went_away_since_are_said_in_a_line_each(archive: Path) -> None:
     assert run("index", archive).code == 0
     (archive / "b.pgm").unlink()

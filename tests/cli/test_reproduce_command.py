@@ -42,7 +42,7 @@ def test_the_command_refuses_other_settings_in_one_line(copy: Path) -> None:
     ("options", "said"),
     [
         (("--mappings", 1), "mappings must be in 2..9, not 1"),
-        (("--method", "guess"), "unknown method 'guess'"),
+        (("--method", "guess"), "no method 'guess' (there are: paper, default, "),
         (("--method", "paper", "--method", "alphabet"), "there twice: alphabet, alphabet"),
         (("--size", "10"), "whole metres are needed"),
         (("--size", "3x3"), "the ground needs sides of"),

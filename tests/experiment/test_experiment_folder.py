@@ -8,7 +8,6 @@ from mapmeld.experiment import folder as folders
 from mapmeld.experiment.folder import add_time, open_folder, read_row, stage_times, write_row
 from mapmeld.experiment.rows import JoinRow, MatchingRow
 from mapmeld.fingerprint import code_version
-from mapmeld.io import MapFileError
 
 SETTINGS = ExperimentSettings(environments=1, mappings=2)
 JOIN = JoinRow(
@@ -76,7 +75,7 @@ def test_a_damaged_row_is_said_in_one_line(change: dict[str, object], tmp_path: 
 
 def test_a_row_that_is_no_json_is_said_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "row.json").write_text("{")
-    with pytest.raises(MapFileError, match="is not JSON"):
+    with pytest.raises(ExperimentError, match=r"is not JSON.* remove it, and"):
         read_row(tmp_path / "row.json", JoinRow)
 
 

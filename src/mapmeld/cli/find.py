@@ -42,6 +42,7 @@ def find(
     from mapmeld.cli.maps import load_maps, same_map
     from mapmeld.cli.parameters import effective_parameters
     from mapmeld.cli.progress import counting, working
+    from mapmeld.errors import MapmeldError
     from mapmeld.index import candidates_for, read_index
     from mapmeld.index import find as find_maps
     from mapmeld.matching import Verdict
@@ -70,7 +71,9 @@ def find(
     for candidate in gone:
         say(f"note: {candidate.problem}")
     if gone:
-        say(f"note: {index} is out of date; run 'mapmeld index' again")
+        say(f"note: {index} is out of date, or not where it was made; run 'mapmeld index' again")
+    if found and len(gone) == len(found):
+        raise MapmeldError(f"{index}: no map that looks like {map_} could be read")
     accepted = any(c.result is not None and c.result.verdict is Verdict.ACCEPTED for c in found)
     if not (found if candidates_only else accepted):
         raise typer.Exit(NO_MATCH)

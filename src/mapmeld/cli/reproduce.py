@@ -87,9 +87,14 @@ def reproduce(
     from mapmeld.experiment.pages.report import RESULTS, write_report
     from mapmeld.experiment.settings import PAPER_METHOD
     from mapmeld.matching import DEFAULT_METHOD
+    from mapmeld.matching.match import METHODS
     from mapmeld.simulation import Settings
 
     names = {PAPER: PAPER_METHOD, DEFAULT: DEFAULT_METHOD}
+    for name in method or ():
+        if name not in names and name not in METHODS:
+            there = ", ".join((*names, *METHODS))
+            raise typer.BadParameter(f"no method {name!r} (there are: {there})", param_hint="--method")
     place = Settings()
     if size is not None:
         width, height = sides(size)

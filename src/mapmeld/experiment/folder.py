@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, Union, get_args, get_origin, get
 
 from mapmeld.experiment.settings import ExperimentError, ExperimentSettings
 from mapmeld.fingerprint import code_version
+from mapmeld.io import MapFileError
 from mapmeld.io.atomic import write_files
 from mapmeld.io.plain_json import read_object
 
@@ -137,12 +138,13 @@ def read_row(path: Path, kind: type[Row]) -> Row:
 
     Raises
     ------
-    MapFileError
-        It cannot be read as JSON.
     ExperimentError
-        It is no such row.
+        It is no such row, or cannot be read.
     """
-    content = read_object(path)
+    try:
+        content = read_object(path)
+    except MapFileError as error:
+        raise ExperimentError(f"{error}; remove it, and the same command makes it again") from error
     types = get_type_hints(kind)
     wanted = {field.name for field in fields(kind) if field.default is MISSING}
     if wanted != set(content):

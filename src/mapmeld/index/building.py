@@ -35,7 +35,7 @@ class Built:
     kept
         How many it knew and had not changed.
     gone
-        Names of maps that it had, and that are no more, or no more readable.
+        Names of maps that it had, and that are no more.
     skipped
         Files that are not maps or cannot be read: (name, what is wrong in one line).
     """
@@ -132,7 +132,7 @@ def build_index(
         if on_progress and len(done) > kept:
             on_progress(_index(root, done))
         raise
-    gone = tuple(sorted(set(before) - set(done)))
+    gone = tuple(sorted(set(before) - set(names)))
     return Built(_index(root, done), len(done) - kept, kept, gone, tuple(sorted(skipped)))
 
 

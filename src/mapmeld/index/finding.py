@@ -120,4 +120,5 @@ def _rank(candidate: Candidate) -> tuple[int, float, float]:
     if result is None:
         return 3, 0.0, -candidate.score
     place = {Verdict.ACCEPTED: 0, Verdict.AMBIGUOUS: 1, Verdict.REJECTED: 2}[result.verdict]
-    return place, -(result.probability or 0.0), -candidate.score
+    # What is as sure as the other to all that matters is told apart by looks.
+    return place, -round(result.probability or 0.0, 3), -candidate.score

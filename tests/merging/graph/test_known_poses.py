@@ -46,6 +46,7 @@ def test_matching_can_be_switched_off(tmp_path: Path, word: str, matching: bool)
         ("one.yaml: {x: 0, y: 0, theta: 0}", "no key 'theta'"),
         ("one.yaml: {y: 0, theta_deg: 0}", "x is missing"),
         ("one.yaml: {x: a, y: 0, theta_deg: 0}", "x must be a number"),
+        ("one.yaml: {x: 0, y: 0, theta_rad: 90}", "90 rad is more than 2 turns: degrees"),
         ("one.yaml: {x: .inf, y: 0, theta_deg: 0}", "x must be a number"),
         ("one.yaml: {x: 1e300, y: 0, theta_deg: 0}", "x must be a number"),
         ("one.yaml: {x: [1], y: 0, theta_deg: 0}", "nests more than 2"),

@@ -39,6 +39,7 @@ from mapmeld.experiment.statistics import (
 )
 from mapmeld.io.atomic import write_files
 from mapmeld.report.canvas import Picture
+from mapmeld.wording import plural
 
 RESULTS = "results.json"
 _LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "numba", "mujoco", "scikit-image", "matplotlib")
@@ -147,7 +148,8 @@ def _summary(results: Results) -> Iterator[str]:
     yield "<h1>Map matching, reproduced</h1>"
     yield html.paragraph(
         f"“Map Matching for SLAM with Multiple Robots in Different Moments”, sections 3 and 4, from nothing: "
-        f"{len(results.environments)} random environments, {len(results.mappings)} simulated mappings, "
+        f"{plural(len(results.environments), 'random environment')}, "
+        f"{plural(len(results.mappings), 'simulated mapping')}, "
         f"{count} matchings of mapping processes, judged by the known truth.",
         "lead",
     )

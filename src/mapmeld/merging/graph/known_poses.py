@@ -26,6 +26,9 @@ from mapmeld.se2 import Pose2
 EXACT = 1e-6
 """Deviation [m, rad] of a pose that is known exactly; 0 would be no covariance."""
 
+MOST_TURNS = 2
+"""An angle beyond that many turns is taken for degrees that were meant as radians."""
+
 _ANGLES = ("theta_deg", "theta_rad", "yaw_deg", "yaw_rad")
 _SIGMA_ANGLES = ("sigma_deg", "sigma_rad")
 _KEYS = ("x", "y", *_ANGLES, "sigma_m", *_SIGMA_ANGLES)
@@ -57,6 +60,10 @@ class KnownPose:
         numbers = (self.T_w_i.x, self.T_w_i.y, self.T_w_i.theta, self.sigma_metres, self.sigma_theta)
         if not all(map(math.isfinite, numbers)):
             raise ValueError("a known pose must be finite")
+        if abs(self.T_w_i.theta) > MOST_TURNS * math.tau:
+            raise ValueError(
+                f"an angle of {self.T_w_i.theta:g} rad is more than {MOST_TURNS} turns: degrees?"
+            )
         if self.sigma_metres < 0 or self.sigma_theta < 0:
             raise ValueError("a standard deviation cannot be negative")
 
