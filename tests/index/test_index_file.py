@@ -141,7 +141,8 @@ def test_an_index_without_maps_and_one_of_one_map(tmp_path: Path) -> None:
     save(office(), tmp_path / "none" / "a.yaml")
     write_index(index_of(tmp_path / "none"), tmp_path / "i")
     (only,) = candidates_for(office(), read_index(tmp_path / "i", signature_of(office())))
-    assert (only.path.name, only.score) == ("a.yaml", pytest.approx(1, abs=1e-6))
+    assert only.path.name == "a.yaml"
+    assert only.score == pytest.approx(1, abs=1e-6)
 
 
 def test_names_in_any_script(tmp_path: Path) -> None:
