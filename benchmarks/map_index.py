@@ -1,6 +1,6 @@
 """The map index: recall on maps with known truth, what `find` then answers, and time among many maps.
 
-    python benchmarks/map_index.py DATA [--parts recall find graph time] [--synthetic 10000]
+    python benchmarks/map_index.py DATA [--parts recall find graph time] [--synthetic 10000] [--keep FOLDER]
 
 DATA is the folder that holds the data sets `paper`, `radish` and `halmstad` (benchmarks/README.md); their
 maps together are one index. Every map is a query against all others: as it is, turned by a random angle, and
@@ -15,11 +15,13 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,7 +51,7 @@ from mapmeld.index.entries import Stamp
 from mapmeld.io import load, save
 from mapmeld.matching import Verdict
 from mapmeld.matching.correlative.prepared_map import prepare
-from mapmeld.merging.graph import match_all_pairs
+from mapmeld.merging.graph import match_all_pairs, solve
 from mapmeld.se2 import Pose2
 
 SETS = ("paper", "radish", "halmstad")
@@ -92,7 +94,7 @@ def main() -> None:
     parser.add_argument("data", type=Path)
     parser.add_argument("--synthetic", type=int, default=10_000, metavar="MAPS")
     parser.add_argument(
-        "--distinct", type=int, metavar="MAPS", help="draw so many and repeat them, which takes less time"
+        "--keep", type=Path, metavar="FOLDER", help="keep the simulated maps' index there, and use it again"
     )
     parser.add_argument(
         "--queries",
@@ -118,7 +120,7 @@ def main() -> None:
         print_graph(maps)
     if "time" in options.parts:
         print_times(maps)
-        print_synthetic(options.synthetic, options.distinct or options.synthetic)
+        print_synthetic(options.synthetic, options.keep)
 
 
 def collected(data: Path) -> Collection:
@@ -301,26 +303,46 @@ def is_right(maps: Collection, i: int, j: int, T_i_j: Pose2) -> bool | None:
 
 # ---------------------------------------------------------------------- pairs worth matching
 def print_graph(maps: Collection) -> None:
-    """Print what matching only likely pairs costs and saves."""
+    """Print what matching only likely pairs costs and saves, for all maps and for some alone."""
     print(
-        "| candidates per map | pairs matched | accepted, same building | accepted, other building | seconds |"  # noqa: E501
+        "| maps | candidates per map | pairs matched | right | wrong | not judged | another building | seconds | buildings whole | mixed |"  # noqa: E501
     )
-    print("|--:|--:|--:|--:|--:|")
-    for candidates in (None, 10, 5):
-        started = time.perf_counter()
-        grids = [load(path) for path in maps.paths]  # anew: what is known of a map is remembered with it
-        found = match_all_pairs(grids, candidates=candidates)
-        seconds = time.perf_counter() - started
-        accepted = [(i, j) for i, j, result in found if result.verdict is Verdict.ACCEPTED]
-        same = sum(maps.building[i] == maps.building[j] for i, j in accepted)
-        cells = [
-            "all" if candidates is None else str(candidates),
-            f"{len(found)}",
-            f"{same}",
-            f"{len(accepted) - same}",
-        ]
-        print("| " + " | ".join([*cells, f"{seconds:.0f}"]) + " |", flush=True)
+    print("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|")
+    shelves = {"all": "", "halmstad E5": "halmstad E5", "paper": "paper", "radish": "radish"}
+    for shelf, start in shelves.items():
+        chosen = [i for i, building in enumerate(maps.building) if building.startswith(start)]
+        for candidates in (None, 10, 5):
+            cells = _graph_of(maps, chosen, candidates)
+            print(f"| {shelf}, {len(chosen)} | " + " | ".join(cells) + " |", flush=True)
     print()
+
+
+def _graph_of(maps: Collection, chosen: list[int], candidates: int | None) -> list[str]:
+    started = time.perf_counter()
+    grids = [load(maps.paths[i]) for i in chosen]  # anew: what is known of a map is remembered with it
+    found = match_all_pairs(grids, candidates=candidates)
+    seconds = time.perf_counter() - started
+    judged: Counter[bool | None] = Counter()
+    other = 0
+    for a, b, result in found:
+        if result.verdict is not Verdict.ACCEPTED or result.T_a_b is None:
+            continue
+        i, j = chosen[a], chosen[b]
+        if maps.building[i] != maps.building[j]:
+            other += 1
+        else:
+            judged[is_right(maps, i, j, result.T_a_b)] += 1
+    components = [{maps.building[chosen[k]] for k in c} for c in solve(grids, found).components]
+    parts = Counter(name for names in components for name in names)
+    whole = sum(count == 1 for count in parts.values())
+    counts = [len(found), judged[True], judged[False], judged[None], other]
+    return [
+        "all" if candidates is None else f"{candidates}",
+        *(f"{count}" for count in counts),
+        f"{seconds:.1f}",
+        f"{whole} of {len(parts)}",
+        f"{sum(len(names) > 1 for names in components)}",
+    ]
 
 
 # ---------------------------------------------------------------------- time and size
@@ -339,64 +361,91 @@ def print_times(maps: Collection) -> None:
     print(f"{size / built.read:.0f} bytes a map.\n", flush=True)
 
 
-def print_synthetic(count: int, distinct: int) -> None:
-    """Print the time of a query among many simulated maps, two of each plan, and how often it finds the other."""  # noqa: E501
-    plans, signatures = [], []
-    every = max(1, distinct // QUERIES)
-    asked: dict[int, OccupancyGrid] = {}
-    seconds = 0.0
-    for number, (plan, grid) in enumerate(synthetic_maps(distinct, seed=11)):
-        if number % every == 0:  # a copy: what is known of a map is remembered with it
-            asked[number] = OccupancyGrid(np.array(grid.cells), grid.resolution, grid.origin)
-        started = time.perf_counter()
-        signatures.append(signature_of(grid))
-        seconds += time.perf_counter() - started
-        plans.append(plan)
-    once = Ranking.of(signatures)
-    found = []
-    for number in asked:
-        order, _ = once.best(signatures[number])
-        others = [plans[m] == plans[number] for m in order if m != number]
-        found.append(others.index(True) if True in others else distinct)
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "index"
-        many = [signatures[n % distinct] for n in range(count)]
-        write_index(MapIndex(Path(folder), entries(many, Stamp(0, 0)), Ranking.of(many)), file)
-        size = file.stat().st_size
-        started = time.perf_counter()
+def print_synthetic(count: int, keep: Path | None) -> None:
+    """Print what a query takes among many simulated maps, two of each plan, and how often it finds the other."""  # noqa: E501
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = keep or Path(temporary)
+        file = folder / f"simulated_{count}.index"
+        if not file.exists():
+            folder.mkdir(parents=True, exist_ok=True)
+            write_simulated(count, file)
         index = read_index(file)
-        reading = time.perf_counter() - started
-        processes = [process_seconds(grid, file) for grid in list(asked.values())[:10]]
-    ranking = index.ranking
-    times = []
-    for grid in asked.values():
+        ranks = []
+        for number in range(0, count, max(1, count // QUERIES)):
+            order, _ = index.ranking.best(index.ranking.signature(number))
+            ranks.append(order[order != number].tolist().index(number ^ 1) if number ^ 1 in order else count)
+        print(f"{count} simulated maps, {file.stat().st_size / 1e6:.1f} MB. ", end="")
+        print(f"Of {len(ranks)} the other one of the same plan is among the first 5: ", end="")
+        print(f"{np.mean(np.array(ranks) < 5):.2f}, 10: {np.mean(np.array(ranks) < 10):.2f}.\n")
+        asked = [grid for _, grid in synthetic_maps(2 * QUERIES, seed=12)][::2]  # of plans that are not in it
+        asked = [OccupancyGrid(np.array(g.cells), g.resolution, g.origin) for g in asked]
+        processes, memory = process_seconds(asked, file, Path(temporary))
+        rows = {
+            "a process of `mapmeld find --candidates-only`": processes,
+            "in a process that runs: its signature": seconds_of(signature_of, asked),
+            "reading what the query needs": seconds_of(lambda g: read_index(file, signature_of(g)), asked),
+            "ranking": seconds_of(lambda g: index.ranking.best(signature_of(g)), asked),
+            "reading all of the index": seconds_of(lambda _: read_index(file), asked[:10]),
+        }
+        print("| seconds | median | longest | of |\n|---|--:|--:|--:|")
+        for what, seconds in rows.items():
+            print(f"| {what} | {statistics.median(seconds):.3f} | {max(seconds):.3f} | {len(seconds)} |")
+        print(f"\nMemory of such a process: {memory:.0f} MB at most.")
+
+
+def write_simulated(count: int, file: Path) -> None:
+    """Draw maps, describe them, and write their index."""
+    signatures = []
+    drawing, describing = [], []
+    maps = synthetic_maps(count, seed=11)
+    for _ in range(count):
         started = time.perf_counter()
-        ranking.best(signature_of(grid))
-        times.append(time.perf_counter() - started)
-    usual = statistics.median(times)
-    print(
-        f"{count} simulated maps ({distinct} drawn): {seconds / distinct * 1e3:.0f} ms a signature; ", end=""
-    )
-    print(f"{size / 1e6:.1f} MB on disk, read in {reading:.2f} s; ", end="")
-    print(f"a query {usual * 1e3:.0f} ms, {max(times) * 1e3:.0f} ms at most (of {len(times)}, ", end="")
-    print("its signature included). ", end="")
-    print(
-        f"The whole process of `mapmeld find --candidates-only`: {statistics.median(processes):.2f} s, ",
-        end="",
-    )
-    print(f"{max(processes):.2f} s at most (of {len(processes)}).")
-    print(f"Of {distinct} maps the other one of the same plan is among the first 5: ", end="")
-    print(f"{np.mean(np.array(found) < 5):.2f}, 10: {np.mean(np.array(found) < 10):.2f}.")
+        _, grid = next(maps)
+        drawn = time.perf_counter()
+        signatures.append(signature_of(grid))
+        drawing.append(drawn - started)
+        describing.append(time.perf_counter() - drawn)
+    of_each = [f"{statistics.median(seconds) * 1e3:.0f} ms" for seconds in (drawing, describing)]
+    print("To draw a map takes {}, to describe it {}.".format(*of_each))
+    write_index(MapIndex(file.parent, entries(signatures, Stamp(0, 0)), Ranking.of(signatures)), file)
 
 
-def process_seconds(grid: OccupancyGrid, index: Path) -> float:
-    """Return what a query takes from the start of a new process to its end."""
-    query = index.with_name("query.yaml")
-    save(grid, query, force=True)
+def seconds_of(step: Callable[[OccupancyGrid], object], grids: Sequence[OccupancyGrid]) -> list[float]:
+    """Time a step for each map."""
+    seconds = []
+    for grid in grids:
+        started = time.perf_counter()
+        step(grid)
+        seconds.append(time.perf_counter() - started)
+    return seconds
+
+
+def process_seconds(grids: Sequence[OccupancyGrid], index: Path, folder: Path) -> tuple[list[float], float]:
+    """Time queries from the start of a new process to its end; return the seconds and most memory [MB].
+
+    As in an installed package, Python has its bytecode: a first query, which makes it, is not counted.
+    """
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+    environment["PYTHONPYCACHEPREFIX"] = str(folder / "bytecode")
+    query = folder / "query.yaml"
     command = [sys.executable, "-m", "mapmeld", "find", str(query), "--in", str(index), "--candidates-only"]
-    started = time.perf_counter()
-    subprocess.run(command, check=True, capture_output=True)
-    return time.perf_counter() - started
+
+    def ask(grid: OccupancyGrid) -> None:
+        subprocess.run(command, check=True, capture_output=True, env=environment)
+
+    seconds = []
+    for grid in (grids[0], *grids):
+        save(grid, query, force=True)
+        seconds += seconds_of(ask, [grid])
+    # By way of a small process: to its children the system counts what this one has.
+    program = (
+        "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, capture_output=True); "
+    )
+    program += "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
+    said = subprocess.run(
+        [sys.executable, "-c", program, *command], check=True, capture_output=True, env=environment
+    )
+    return seconds[1:], int(said.stdout) / 1e3
 
 
 def entries(signatures: Sequence[Signature], stamp: Stamp) -> tuple[IndexedMap, ...]:

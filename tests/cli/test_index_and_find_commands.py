@@ -119,6 +119,31 @@ def test_a_damaged_index_is_one_line_and_force_mends_it(archive: Path) -> None:
     assert run("index", archive, "--force").code == 0
 
 
+def test_an_index_by_another_version_is_one_line_and_force_mends_it(archive: Path) -> None:
+    index = archive / "mapmeld.index"
+    assert run("index", archive).code == 0
+    index.write_bytes(b"mapmeld index 1" + index.read_bytes()[len("mapmeld index 1") :])
+    for command in (["find", archive / "a.yaml", "--in", index], ["index", archive]):
+        outcome = run(*command)
+        assert outcome.code == 2
+        assert (
+            "made by another version of mapmeld; make it again with 'mapmeld index --force'" in outcome.line
+        )
+    assert run("index", archive, "--force").code == 0
+    assert run("find", archive / "a.yaml", "--in", index, "--candidates-only").code == 0
+
+
+def test_a_folder_of_maps_that_moved_away_is_said(archive: Path) -> None:
+    assert run("index", archive, "-o", archive.parent / "i").code == 0
+    (query,) = write_maps(archive.parent, "a")
+    archive.rename(archive.parent / "elsewhere")
+    outcome = run("find", query, "--in", archive.parent / "i")
+    assert outcome.code == 1
+    assert "a.yaml: no such file" in outcome.err
+    assert "run 'mapmeld index' again" in outcome.err
+    assert "Traceback" not in outcome.err
+
+
 def test_folders_without_maps(tmp_path: Path) -> None:
     assert run("index", tmp_path / "none").code == 2
     (tmp_path / "bad.yaml").write_text("x: 1\n")
@@ -128,6 +153,10 @@ def test_folders_without_maps(tmp_path: Path) -> None:
     assert not (tmp_path / "mapmeld.index").exists()
     (tmp_path / "bad.yaml").unlink()
     assert "0 maps in the index" in run("index", tmp_path).out
+    (query,) = write_maps(tmp_path, "a")
+    nothing = run("find", query, "--in", tmp_path / "mapmeld.index")
+    assert nothing.code == 1
+    assert "Of 0 maps in the index, none looks like" in nothing.out
 
 
 def test_workers(archive: Path) -> None:

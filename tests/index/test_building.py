@@ -1,4 +1,5 @@
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -6,7 +7,7 @@ import pytest
 from drawing import office, school
 from index_maps import index_of, write_buildings
 
-from mapmeld.index import MapIndex, MapIndexError, build_index, building, map_files
+from mapmeld.index import MapIndex, MapIndexError, build_index, building, map_files, read_index, write_index
 from mapmeld.io import save
 
 
@@ -101,3 +102,22 @@ def test_processes_give_the_same(tmp_path: Path) -> None:
     here, there = index_of(tmp_path), build_index(tmp_path, map_files(tmp_path), workers=2).index
     assert [m.name for m in here.maps] == [m.name for m in there.maps]
     assert np.array_equal(here.ranking.weights, there.ranking.weights)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere every file name is text")
+def test_a_name_that_is_no_text_is_skipped_in_a_line(tmp_path: Path) -> None:
+    write_buildings(tmp_path)
+    for ending in (b".yaml", b".pgm"):
+        os.rename(os.fsencode(tmp_path / "school") + ending, os.fsencode(tmp_path) + b"/sch\xffool" + ending)  # noqa: PTH104
+    text = os.fsencode(tmp_path) + b"/sch\xffool.yaml"
+    with open(text, "rb") as file:  # noqa: PTH123
+        described = file.read()
+    with open(text, "wb") as file:  # noqa: PTH123
+        file.write(described.replace(b"school.pgm", b"office.pgm"))
+    done = build_index(tmp_path, map_files(tmp_path))
+    assert [m.name for m in done.index.maps] == ["floor/west.yaml", "office.yaml"]
+    ((_, problem),) = done.skipped
+    assert "not Unicode" in problem
+    problem.encode()
+    write_index(done.index, tmp_path / "i")
+    assert len(read_index(tmp_path / "i").maps) == 2

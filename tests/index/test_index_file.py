@@ -7,13 +7,24 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawing import hall, office, school
 from hypothesis import given
 from hypothesis import strategies as st
 from index_maps import index_of, write_buildings
 
 from mapmeld.errors import MapmeldError
-from mapmeld.index import MapIndexError, is_index, read_index, write_index
-from mapmeld.index.index_file import MAGIC
+from mapmeld.index import (
+    MapIndexError,
+    candidates_for,
+    index_file,
+    is_index,
+    read_index,
+    signature_of,
+    write_index,
+)
+from mapmeld.index.index_file import MAGIC, MAX_BYTES
+from mapmeld.index.signature import word_count
+from mapmeld.io import save
 
 
 @pytest.fixture(scope="module")
@@ -84,12 +95,83 @@ def test_a_truncated_or_changed_file_is_one_line(
 
 
 def test_truncated_anywhere_in_the_words(tmp_path: Path, written: bytes) -> None:
-    assert "checksum" in refused(tmp_path / "i", written[:-1])
+    assert "bytes of signatures instead of" in refused(tmp_path / "i", written[:-1])
+    assert "bytes of signatures instead of" in refused(tmp_path / "i", written + b"\0")
     assert "is damaged" in refused(tmp_path / "i", written[: len(MAGIC) + 30])
 
 
+def test_only_the_rows_of_a_query_are_read_and_they_rank_the_same(tmp_path: Path, written: bytes) -> None:
+    (tmp_path / "i").write_bytes(written)
+    whole = read_index(tmp_path / "i").ranking
+    for asked in (whole.signature(0), signature_of(hall())):
+        part = read_index(tmp_path / "i", asked).ranking
+        assert len(part.weights) == np.count_nonzero(asked.weights) < len(whole.weights)
+        assert np.array_equal(part.scores(asked), whole.scores(asked))
+
+
+def test_an_index_read_for_one_map_does_not_answer_for_another(tmp_path: Path, written: bytes) -> None:
+    (tmp_path / "i").write_bytes(written)
+    part = read_index(tmp_path / "i", signature_of(hall())).ranking
+    with pytest.raises(ValueError, match="for another signature"):
+        part.scores(signature_of(school()))
+    with pytest.raises(ValueError, match="for another signature"):
+        part.signature(0)
+
+
+def test_a_damaged_row_is_said_when_it_is_read(tmp_path: Path, written: bytes) -> None:
+    (tmp_path / "i").write_bytes(written)
+    asked = read_index(tmp_path / "i").ranking.signature(0)
+    for word in (np.flatnonzero(asked.weights)[0], np.flatnonzero(asked.weights == 0)[0]):
+        at = len(written) - (word_count() - int(word)) * 3  # 3 maps
+        broken = written[:at] + bytes([written[at] ^ 1]) + written[at + 1 :]
+        assert "a checksum in it is wrong" in refused(tmp_path / "i", broken)
+        if asked.weights[word]:
+            with pytest.raises(MapIndexError, match="a checksum in it is wrong"):
+                read_index(tmp_path / "i", asked)
+        else:
+            assert read_index(tmp_path / "i", asked).ranking.scores(asked)[0] == pytest.approx(1)
+
+
+def test_an_index_without_maps_and_one_of_one_map(tmp_path: Path) -> None:
+    (tmp_path / "none").mkdir()
+    write_index(index_of(tmp_path / "none"), tmp_path / "i")
+    none = read_index(tmp_path / "i", signature_of(office()))
+    assert none.maps == ()
+    assert candidates_for(office(), none) == ()
+    save(office(), tmp_path / "none" / "a.yaml")
+    write_index(index_of(tmp_path / "none"), tmp_path / "i")
+    (only,) = candidates_for(office(), read_index(tmp_path / "i", signature_of(office())))
+    assert only.path.name == "a.yaml"
+    assert only.score == pytest.approx(1, abs=1e-6)
+
+
+def test_names_in_any_script(tmp_path: Path) -> None:
+    folder = tmp_path / "Büro 二階"
+    folder.mkdir()
+    save(office(), folder / "маппа \N{SNOWMAN}.yaml")
+    write_index(index_of(tmp_path), folder / "индекс")
+    (found,) = read_index(folder / "индекс").maps
+    assert found.name == "Büro 二階/маппа \N{SNOWMAN}.yaml"
+    assert found.is_unchanged(tmp_path)
+
+
+def test_a_head_without_end_is_not_read_to_its_end(
+    tmp_path: Path, written: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(index_file, "MAX_HEAD_BYTES", 100)
+    assert "is damaged" in refused(tmp_path / "i", written)
+
+
+def test_a_file_larger_than_any_index_is_not_read(tmp_path: Path) -> None:
+    with (tmp_path / "i").open("wb") as file:
+        file.write(MAGIC)
+        file.truncate(MAX_BYTES + 1)  # takes no space
+    with pytest.raises(MapIndexError, match="too large"):
+        read_index(tmp_path / "i")
+
+
 def test_another_version(tmp_path: Path, written: bytes) -> None:
-    assert "another version" in refused(tmp_path / "i", written.replace(b"index 2\n", b"index 3\n", 1))
+    assert "another version" in refused(tmp_path / "i", written.replace(b"index 3\n", b"index 2\n", 1))
     head, rest = parts(written)
     assert "another version" in refused(tmp_path / "i", joined({**head, "signatures": "old"}, rest))
 

@@ -17,7 +17,7 @@ from mapmeld.index.signature import (
     word_count,
     words_from,
 )
-from mapmeld.index.views import SIZE, Views, wall_views
+from mapmeld.index.views import MOST, SIZE, Views, wall_views
 from mapmeld.se2 import Pose2
 
 OTHERS = [signature_of(grid) for grid in (school(), hall(), row_of_rooms(3))]
@@ -74,6 +74,18 @@ def test_quarter_turns_padding_and_other_frames_change_next_to_nothing(
 ) -> None:
     turned = OccupancyGrid(np.rot90(OFFICE.cells, quarters), OFFICE.resolution, origin)
     assert likeness(turned.extended(*pad), OFFICE) > 0.7
+
+
+@given(quarters=st.integers(1, 3), pad=st.tuples(*[st.integers(0, 40)] * 4), origin=st.from_type(Pose2))
+@settings(max_examples=15)
+def test_a_quarter_turn_changes_nothing_where_all_of_the_wall_is_looked_at(
+    quarters: int, pad: tuple[int, int, int, int], origin: Pose2
+) -> None:
+    half = cut(OFFICE, 0, 0, 8, 12)  # the whole has more points of wall than are looked at
+    assert len(wall_views(half).metres) < MOST
+    turned = OccupancyGrid(np.rot90(half.cells, quarters), half.resolution, origin).extended(*pad)
+    difference = signature_of(turned).weights.astype(int) - signature_of(half).weights
+    assert np.abs(difference).max() <= 1  # of 255: the last digit of a sum
 
 
 def test_padding_by_whole_cells_of_unknown_space_and_the_frame_change_nothing() -> None:

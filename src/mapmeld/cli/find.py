@@ -43,15 +43,15 @@ def find(
     from mapmeld.cli.parameters import effective_parameters
     from mapmeld.cli.progress import counting, working
     from mapmeld.errors import MapmeldError
-    from mapmeld.index import candidates_for, read_index
+    from mapmeld.index import candidates_for, read_index, signature_of
     from mapmeld.index import find as find_maps
     from mapmeld.matching import Verdict
 
     parameters = effective_parameters(method, params, settings)
     started = time.perf_counter()
     with working("Reading the index"):
-        maps = read_index(index)
         (grid,) = load_maps([map_], resolution)
+        maps = read_index(index, signature_of(grid))
     own = Path(same_map(map_))
     if candidates_only:
         found = candidates_for(grid, maps, top, own)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from mapmeld.errors import MapmeldError
 from mapmeld.index.ranking import Ranking
@@ -20,9 +21,11 @@ class MapIndexError(MapmeldError):
         return cls(printable(f"{path}: {problem}"))
 
 
-@dataclass(frozen=True, slots=True)
-class Stamp:
-    """What tells that a file is as it was: its size [bytes] and when it was last changed [ns]."""
+class Stamp(NamedTuple):
+    """What tells that a file is as it was: its size [bytes] and when it was last changed [ns].
+
+    A tuple, as the maps of an index are: thousands are made for every query.
+    """
 
     size: int
     changed: int
@@ -37,8 +40,7 @@ class Stamp:
         return cls(found.st_size, found.st_mtime_ns)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class IndexedMap:
+class IndexedMap(NamedTuple):
     """A map in an index.
 
     Attributes

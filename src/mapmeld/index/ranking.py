@@ -27,7 +27,10 @@ class Ranking:
     Attributes
     ----------
     weights
-        uint8 (words, n): a row for each word, so that a map that is looked for needs its own words' only.
+        uint8 (rows, n): a row for each word that is at hand.
+    rows
+        Index (words,): which row is a word's; -1 if it is not at hand. A map that is looked for needs its own
+        words' only.
     owners
         uint32 (words,): how many of the signatures have a word.
     lengths
@@ -35,6 +38,7 @@ class Ranking:
     """
 
     weights: NDArray[np.uint8]
+    rows: Index
     owners: NDArray[np.uint32]
     lengths: NDArray[np.float32]
 
@@ -49,7 +53,7 @@ class Ranking:
         squared = np.zeros(len(signatures))
         for row, square in zip(weights, squares, strict=True):
             squared += np.square(row.astype(np.float64)) * square
-        return cls(weights, owners, np.sqrt(squared).astype(np.float32))
+        return cls(weights, np.arange(word_count()), owners, np.sqrt(squared).astype(np.float32))
 
     @property
     def count(self) -> int:
@@ -57,20 +61,46 @@ class Ranking:
         return len(self.lengths)
 
     def signature(self, number: int) -> Signature:
-        """Return one of the signatures."""
-        return Signature(np.ascontiguousarray(self.weights[:, number]))
+        """Return one of the signatures.
+
+        Raises
+        ------
+        ValueError
+            Not all words are at hand.
+        """
+        return Signature(np.ascontiguousarray(self.weights[self.rows_of(np.arange(len(self.rows))), number]))
 
     def scores(self, signature: Signature) -> Doubles:
-        """Return how much each of the signatures looks like this one (count,), 0..1."""
+        """Return how much each of the signatures looks like this one (count,), 0..1.
+
+        Raises
+        ------
+        ValueError
+            It has words that are not at hand.
+        """
         words = np.flatnonzero(signature.weights)
+        rows = self.rows_of(words)
         rarity = _rarity(self.owners, self.count)[words]
         value = signature.weights[words] * rarity
         length = float(np.linalg.norm(value))
         found = np.zeros(self.count)
-        for word, weight in zip(words, value * rarity / (length or 1.0), strict=True):
-            found += weight * self.weights[word]
+        for row, weight in zip(rows, value * rarity / (length or 1.0), strict=True):
+            found += weight * self.weights[row]
         # At most 1 by its nature; a forged file may say otherwise.
         return np.minimum(found / np.where(self.lengths > 0, self.lengths, np.inf), 1.0)
+
+    def rows_of(self, words: Index) -> Index:
+        """Return the rows of words.
+
+        Raises
+        ------
+        ValueError
+            One is not at hand.
+        """
+        rows = self.rows[words]
+        if (rows < 0).any():
+            raise ValueError("this index was read for another signature, without all words of this one")
+        return rows
 
     def best(self, signature: Signature) -> tuple[Index, Doubles]:
         """Return the numbers of the signatures with words in common with this one, and scores, best first."""

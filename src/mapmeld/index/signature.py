@@ -19,6 +19,7 @@ from mapmeld.grid import OccupancyGrid
 from mapmeld.index import views
 from mapmeld.index.views import REACHES, SIZE, Views, wall_views
 from mapmeld.matching.correlative.wall_map import Doubles, Floats
+from mapmeld.matching.per_map import PerMap
 
 VOCABULARY = ("near_words.bin", "wide_words.bin")
 """Files of the words (k, SIZE) of each reach, a byte for each number, by `benchmarks/train_words.py`."""
@@ -41,6 +42,7 @@ class Signature:
     weights: NDArray[np.uint8]
 
 
+@PerMap
 def signature_of(grid: OccupancyGrid) -> Signature:
     """Describe a map; one without walls has no words."""
     return describe(wall_views(grid), vocabulary())
