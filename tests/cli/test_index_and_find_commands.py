@@ -138,7 +138,7 @@ def test_a_folder_of_maps_that_moved_away_is_said(archive: Path) -> None:
     (query,) = write_maps(archive.parent, "a")
     archive.rename(archive.parent / "elsewhere")
     outcome = run("find", query, "--in", archive.parent / "i")
-    assert outcome.code == 1
+    assert outcome.code == 2
     assert "a.yaml: no such file" in outcome.err
     assert "run 'mapmeld index' again" in outcome.err
     assert "Traceback" not in outcome.err
