@@ -190,7 +190,17 @@ def test_sizes_are_not_believed(tmp_path: Path, written: bytes, count: object) -
 
 @pytest.mark.parametrize(
     "name",
-    ["../secret.yaml", "/etc/secret.yaml", "a/../../b.yaml", "", "passwd", "x\0.yaml", 7, "school.yaml"],
+    [
+        "../secret.yaml",
+        "/etc/secret.yaml",
+        "a/../../b.yaml",
+        "",
+        "passwd",
+        "x\0.yaml",
+        7,
+        "school.yaml",
+        "\ud800.yaml",
+    ],
 )
 def test_names_that_lead_out_of_the_folder_or_to_no_map(tmp_path: Path, written: bytes, name: object) -> None:
     head, rest = parts(written)

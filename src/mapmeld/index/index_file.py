@@ -164,6 +164,7 @@ def _whole(value: object) -> int:
 def _text(value: object) -> str:
     if not isinstance(value, str) or "\0" in value:
         raise ValueError("a name that is none")
+    value.encode()  # lone surrogates are no text
     return value
 
 

@@ -86,7 +86,8 @@ class Ranking:
         found = np.zeros(self.count)
         for row, weight in zip(rows, value * rarity / (length or 1.0), strict=True):
             found += weight * self.weights[row]
-        return np.asarray(found / np.where(self.lengths > 0, self.lengths, np.inf))
+        # At most 1 by its nature; a forged file may say otherwise.
+        return np.minimum(found / np.where(self.lengths > 0, self.lengths, np.inf), 1.0)
 
     def rows_of(self, words: Index) -> Index:
         """Return the rows of words.

@@ -254,6 +254,49 @@ def test_known_poses_settle_what_is_ambiguous() -> None:
     assert pair(graph, 0, 1).T_i_j == true(0, 1)
 
 
+@pytest.mark.parametrize("far", [0.0, 5e6])
+def test_a_wrong_exact_pose_takes_its_own_matches_with_it_and_no_others(far: float) -> None:
+    world = Pose2(far, far, 0.7)
+    known = {i: KnownPose(world @ TRUTH[i]) for i in range(3)}
+    known[1] = KnownPose(world @ TRUTH[1] @ Pose2(3, 0, 0))
+    graph = graph_of(4, known=known)
+    states = {(p.i, p.j): p.state for p in graph.pairs}
+    assert {ends for ends, state in states.items() if state is PairState.USED} == {(0, 2), (0, 3), (2, 3)}
+    assert graph.components == ((0, 1, 2, 3),)
+    assert close(graph.poses[3], TRUTH[3])
+
+
+def test_loose_poses_do_not_make_matches_more_exact() -> None:
+    known = {i: KnownPose(TRUTH[i], 2.0, 0.5) for i in range(5)}
+    chain = {(i, j): rejected() for i in range(5) for j in range(i + 2, 5)}
+    with_poses, without = (graph_of(5, chain, known=poses) for poses in (known, None))
+    for one, two in zip(with_poses.pairs, without.pairs, strict=True):
+        if one.covariance is not None and two.covariance is not None:
+            assert np.trace(one.covariance) > 0.9 * np.trace(two.covariance)
+    assert np.trace(with_poses.covariances[1]) > 0.5 * np.trace(without.covariances[1])
+
+
+def test_ambiguous_matches_that_contradict_one_another_settle_nothing() -> None:
+    n = 8
+    maps = [MAPS[0]] * n
+    truth = [Pose2(6.0 * k, 0, 0) for k in range(n)]
+
+    def at(i: int, j: int, y: float) -> Pose2:
+        T = truth[i].inverse() @ truth[j]
+        return Pose2(T.x, y, 0)
+
+    def solved(second: float) -> MapGraph:
+        results = {(k, k + 1): accepted(at(k, k + 1, 0.0)) for k in range(n - 1)}
+        results |= {(0, 7): ambiguous((at(0, 7, 2.0), 0.6)), (0, 6): ambiguous((at(0, 6, second), 0.6))}
+        return solve(maps, [(i, j, r) for (i, j), r in results.items()])
+
+    graph = solved(-2.0)
+    assert {pair(graph, 0, j).state for j in (6, 7)} == {PairState.UNUSED}
+    assert "contradicts that of other ambiguous matches" in pair(graph, 0, 6).why
+    assert close(graph.poses[7], truth[7])
+    assert {pair(solved(1.8), 0, j).state for j in (6, 7)} == {PairState.SETTLED}
+
+
 def test_known_poses_alone() -> None:
     known = {0: KnownPose(W), 2: KnownPose(W @ TRUTH[2], 0.5, 0.1)}
     graph = solve(MAPS[:3], [], known)

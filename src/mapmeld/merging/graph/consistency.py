@@ -33,7 +33,10 @@ FITS = 16.27
 """Squared Mahalanobis distance that one in a thousand right edges exceeds: chi squared, 3 numbers."""
 
 LEAST_ODDS = math.log(0.85 / 0.15)
-"""By how much in log odds an explanation must beat the next one: as sure as an accepted match must be."""
+"""By how much in log odds an explanation must beat the next one: 85 in 100."""
+
+_HELD = 1e3
+"""Cut from which on a known pose is among its edges: all matches together count for less."""
 
 ABSENT = math.log(4.0)
 """What it counts against two groups of maps lying where they were laid that a pair of them which then
@@ -257,6 +260,10 @@ def _against(found: _Found, edges: Edges) -> list[tuple[int, float]]:
     """
     labels = found.fit.labels
     out = np.flatnonzero(~found.used & ~found.barred & (labels[edges.i] == labels[edges.j]))
+    if edges.given.any():
+        # Between nodes that known poses hold nothing can be exchanged, so it speaks for nothing else either.
+        held = [_cut(found, edges, [int(edges.i[k])], [int(edges.j[k])])[0] >= _HELD for k in out]
+        out = out[~np.array(held, np.bool_)]
     if not len(out):
         return []
     X, z = found.fit.poses[edges.i[out]], edges.z[out]

@@ -171,6 +171,7 @@ def solve(
     for k, e in zip(accepted, range(len(given), len(edges)), strict=True):
         pairs[k] = _judged(replace(pairs[k], against_known=bool(without[e] > found.used[e])), found, e, edges)
     pairs = [_settled(pair, found.fit, extents) for pair in pairs]
+    pairs = _agreeing(pairs, Edges.of(given), extents, found.fit.poses, world)
     pairs, final = _fitted(pairs, Edges.of(given), extents, found.fit.poses, world)
     return _graph([_off(pair, final, extents) for pair in pairs], final, world, known or {})
 
@@ -241,6 +242,27 @@ def _settled(pair: PairMatch, found: Fit, extents: Sequence[Extent]) -> PairMatc
     return replace(pair, state=PairState.SETTLED, why=why, T_i_j=mode.T_a_b)
 
 
+def _agreeing(
+    pairs: Sequence[PairMatch], given: Edges, extents: Sequence[Extent], start: Doubles, world: int
+) -> list[PairMatch]:
+    """Take back settled matches that contradict one another: each fits what is known without them."""
+    pairs = list(pairs)
+    while True:
+        used = [k for k, pair in enumerate(pairs) if pair.T_i_j is not None]
+        edges = _joined(given, Edges.of([_edge(pairs[k], pairs[k].T_i_j, extents) for k in used]))
+        strain = fit(start, edges, world).strain(edges, np.ones(len(edges), np.bool_))[len(given) :]
+        back = [
+            k
+            for k, strained in zip(used, strain, strict=True)
+            if pairs[k].state is PairState.SETTLED and strained > FITS
+        ]
+        if not back:
+            return pairs
+        why = "ambiguous; the mode that fits contradicts that of other ambiguous matches"
+        for k in back:
+            pairs[k] = replace(pairs[k], state=PairState.UNUSED, why=why, T_i_j=None)
+
+
 def _near(pair: PairMatch, mode: Pose2, T: Doubles, spread: Doubles, extents: Sequence[Extent]) -> bool:
     """Whether a mode is where the graph says (1, 3), as exactly (1, 3, 3) as that and the mode are known."""
     gap = errors(T, np.array([row_of(mode)]))
@@ -299,9 +321,12 @@ def _fitted(
     first = fit(start, _joined(given, edges), world)
     labels, count = first.labels[edges.i], len(first.frames)
     strain = squared_distance(residuals(first.poses, edges), edges.covariance)
-    ends = np.concatenate([given.i, edges.i])
-    cycles = np.bincount(first.labels[ends], minlength=count) - np.bincount(first.labels, minlength=count) + 1
-    scale = (PRIOR_CYCLES + np.bincount(labels, strain, count) / 3) / (PRIOR_CYCLES + cycles)
+    # Of the 3 numbers of a match so many are checked by others: 3 for each cycle, where no pose is known.
+    fitted = first.relative(edges.i, edges.j)[1]
+    redundancy = 3 - np.trace(np.linalg.solve(edges.covariance, fitted), axis1=1, axis2=2)
+    scale = (PRIOR_CYCLES + np.bincount(labels, strain, count) / 3) / (
+        PRIOR_CYCLES + np.bincount(labels, redundancy, count) / 3
+    )
     edges = replace(edges, covariance=own + scale[labels][:, None, None] * bend)
     pairs = list(pairs)
     for k, covariance in zip(used, edges.covariance, strict=True):
