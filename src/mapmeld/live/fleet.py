@@ -7,7 +7,7 @@ of at most one match (`Fleet.work`), so that whoever drives it can hand in newer
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -18,11 +18,13 @@ from mapmeld.grid import OccupancyGrid
 from mapmeld.history import EvidenceParameters
 from mapmeld.history.changes import same_map
 from mapmeld.live.canvas import Canvas
+from mapmeld.live.exactness import covariances_from, turned
 from mapmeld.live.pair import Pair
 from mapmeld.live.restart import started_anew
 from mapmeld.live.state import Decree, FleetState, PairReport, RobotReport
 from mapmeld.matching import DEFAULT_METHOD
 from mapmeld.matching.match import checked_parameters
+from mapmeld.merging.aligned import MergeError
 from mapmeld.merging.fusion import check_fusion
 from mapmeld.merging.graph import KnownPose, MapGraph, PairMatch, PairState, solve
 from mapmeld.se2 import Pose2
@@ -86,9 +88,10 @@ class _Robot:
 class Fleet:
     """Joins the newest maps of any number of robots.
 
-    The world frame is that of the first robot, by name, of the first group that is joined, or that in which
-    poses are known. It stays where it is though that robot's map is withdrawn. The merged map has one group,
-    the one that holds the world frame; other groups, and robots that are in none, are told of, but not drawn.
+    The world frame is that in which poses are known, once a robot with a known pose has sent a map; else that
+    of the first robot, by name, of the first group that is joined. It stays where it is though that robot's
+    map is withdrawn. The merged map has what is connected with the world frame, by matches or by a known pose
+    of its own; other groups, and robots that are in none, are told of, but not drawn.
 
     Parameters
     ----------
@@ -110,7 +113,11 @@ class Fleet:
         self._poses: dict[str, Pose2] = {}
         self._anchor: str | None = None
         self._graph: MapGraph | None = None
+        self._groups: dict[str, list[str]] = {}  # with whom each robot is joined
+        self._covariances: dict[str, NDArray[np.float64]] = {}
+        self._by_known = False  # whether the world frame is that of the known poses
         self._canvas: Canvas | None = None
+        self._blank: OccupancyGrid | None = None  # as large as the last map of a canvas that is no more
         self._looks = 0
         self._stale = True  # whether poses are to be found anew
 
@@ -192,6 +199,7 @@ class Fleet:
         if name not in self._robots:
             raise FleetError(self._no_such(name))
         del self._robots[name]
+        self._poses.pop(name, None)
         self._pairs = {key: pair for key, pair in self._pairs.items() if name not in key}
         self._last.pop(name, None)
         self._stale = True
@@ -199,7 +207,8 @@ class Fleet:
     def reset(self) -> None:
         """Forget all matches, decrees and the world frame; newest maps and known poses stay."""
         self._pairs = {_key(a, b): self._new_pair() for a, b in combinations(sorted(self._robots), 2)}
-        self._last, self._poses, self._anchor, self._canvas = {}, {}, None, None
+        self._last, self._poses, self._anchor = {}, {}, None
+        self._drop_canvas()
         for robot in self._robots.values():
             robot.vouched = None
         self._stale = True
@@ -258,11 +267,19 @@ class Fleet:
                     matches.append((index[a], index[b], result))
         known = {index[name]: pose for name, pose in self._known.items() if name in index}
         if not names:
-            self._graph, self._poses = None, {}
+            self._graph, self._poses, self._anchor = None, {}, None
             return
         graph = self._graph = solve([self._robots[name].newest for name in names], matches, known)
         self._vouch(names, graph)
+        groups = [[names[i] for i in members] for members in graph.components]
+        self._groups = {name: group for group in groups for name in group}
+        if self._by_known != bool(graph.known):
+            self._by_known = bool(graph.known)
+            if self._by_known:
+                self._last, self._poses = {}, {}  # in another world
+            self._drop_canvas()
         poses = self._in_world(names, graph)
+        self._covariances = self._in_world_frame(names, graph, poses)
         self._poses = {
             name: self._still(name, T) for name, T in poses.items() if self._robots[name].vouched is not None
         }
@@ -294,14 +311,29 @@ class Fleet:
             group = max(groups, key=lambda group: sum(name in self._last for name in group))
             before = [name for name in group if name in self._last]
             self._anchor = (before or group)[0]
-            if not before:
-                self._canvas = None  # another world: nothing of the one before is left in it
+            if not before:  # another world: nothing of the one before is left in it
+                self._last, self._poses = {}, {}
+                self._drop_canvas()
         if group is None or self._anchor is None:
             self._anchor = None
             return {}
         T_anchor = graph.poses[names.index(self._anchor)]
         T_world_group = self._last.get(self._anchor, Pose2()) @ T_anchor.inverse()
         return {name: T_world_group @ graph.poses[names.index(name)] for name in group}
+
+    def _in_world_frame(
+        self, names: list[str], graph: MapGraph, poses: Mapping[str, Pose2]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return the covariances of (x, y, theta) of T_world_robot of the robots that have poses."""
+        if not poses:
+            return {}
+        origin = None if self._anchor is None else names.index(self._anchor)
+        found = covariances_from(graph, origin)
+        theta = 0.0 if self._anchor is None else poses[self._anchor].theta
+        return {name: turned(found[names.index(name)], theta) for name in poses}
+
+    def _drop_canvas(self) -> None:
+        self._blank, self._canvas = self.blank(), None
 
     def _still(self, name: str, T: Pose2) -> Pose2:
         before = self._poses.get(name)
@@ -314,7 +346,7 @@ class Fleet:
     def merged(self) -> OccupancyGrid | None:
         """Return the merged map of the robots that are joined; an empty one where none are any more.
 
-        None if none have ever been (since the world frame was set anew).
+        None if none have ever been.
 
         Raises
         ------
@@ -324,14 +356,28 @@ class Fleet:
         placed = {}
         for name, T in self._poses.items():
             vouched = self._robots[name].vouched
-            assert vouched is not None
-            placed[name] = (vouched, T)
+            if vouched is not None:
+                placed[name] = (vouched, T)
         if not placed:
-            return None if self._canvas is None else self._canvas.blank()
-        if self._canvas is None:
-            first = self._anchor or min(placed)
-            self._canvas = Canvas(placed[first][0].resolution, self.settings.world_frame)
+            return self.blank()
+        first = placed[self._anchor if self._anchor in placed else min(placed)][0]
+        if self._canvas is not None and all(
+            grid.resolution != self._canvas.resolution for grid, _ in placed.values()
+        ):
+            self._drop_canvas()
+        if self._canvas is not None:
+            try:
+                return self._canvas.draw(placed, self.settings.fusion)
+            except MergeError:
+                self._drop_canvas()  # what it holds from before may be far from where robots are now
+        self._canvas = Canvas(first.resolution, self.settings.world_frame)
         return self._canvas.draw(placed, self.settings.fusion)
+
+    def blank(self) -> OccupancyGrid | None:
+        """Return a map as large as the last merged one, in which nothing is known; None if there was none."""
+        blank = None if self._canvas is None else self._canvas.blank()
+        blank = self._blank if blank is None else blank
+        return None if blank is None else replace(blank, frame_id=self.settings.world_frame)
 
     @property
     def shown(self) -> tuple[object, ...]:
@@ -344,42 +390,46 @@ class Fleet:
         names = sorted(self._robots)
         matches = {} if self._graph is None else {(m.i, m.j): m for m in self._graph.pairs}
         index = {name: i for i, name in enumerate(names)}
-        robots = tuple(self._robot(name, index[name]) for name in names)
+        robots = tuple(map(self._robot, names))
         pairs = tuple(
             self._pair_report(a, b, pair, matches.get((index[a], index[b])))
             for (a, b), pair in sorted(self._pairs.items())
         )
         return FleetState(robots, pairs, self._anchor)
 
-    def _robot(self, name: str, i: int) -> RobotReport:
+    def _robot(self, name: str) -> RobotReport:
         robot, T = self._robots[name], self._poses.get(name)
         known = name in self._known
-        if known:
-            why = "its pose is known"
-        elif T is not None:
-            why = "the world frame hangs on its map" if name == self._anchor else "joined by matches"
-        elif name in self._suspended:
-            why = "its known pose was that of a mapping before; set it again, or wait for a match"
-        elif robot.starts > 1:
-            why = f"has started anew ({robot.anew}); no match yet"
-        else:
-            why = "no match that is believed joins it"
         return RobotReport(
             name,
             robot.newest.frame_id,
             robot.newest.stamp,
             T,
-            None if T is None else self._covariance(i),
+            None if T is None else self._covariances[name],
             known,
             robot.starts,
             robot.newest.known_area,
-            why,
+            self._why(name),
         )
 
-    def _covariance(self, i: int) -> NDArray[np.float64]:
-        if self._graph is None or i >= len(self._graph.covariances):
-            return np.zeros((3, 3))
-        return self._graph.covariances[i]
+    def _why(self, name: str) -> str:
+        robot = self._robots[name]
+        if name in self._known:
+            return "its pose is known"
+        if name in self._poses:
+            return "the world frame hangs on its map" if name == self._anchor else "joined by matches"
+        others = ", ".join(other for other in self._groups.get(name, ()) if other != name)
+        if others:
+            if self._by_known:
+                return f"joined with {others}, but no known pose reaches them"
+            return f"joined with {others}, but not with those in the world frame"
+        if name in self._suspended:
+            return "its known pose was that of a mapping before; set it again, or wait for a match"
+        if not self.settings.matching:
+            return "its pose is not known, and maps are not matched"
+        if robot.starts > 1:
+            return f"has started anew ({robot.anew}); no match yet"
+        return "no match that is believed joins it"
 
     def _pair_report(self, a: str, b: str, pair: Pair, match: PairMatch | None) -> PairReport:
         best = None if pair.finding is None else pair.finding.best

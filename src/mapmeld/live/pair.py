@@ -10,12 +10,10 @@ from mapmeld.grid import check_resolutions
 from mapmeld.history import EvidenceParameters, Standing
 from mapmeld.history.evidence_over_time import EvidenceOverTime
 from mapmeld.history.step import Finding, Maps
+from mapmeld.history.transforms import same_place
 from mapmeld.live.state import Decree
 from mapmeld.matching import MatchResult, Verdict
-from mapmeld.se2 import Pose2
-
-CONFIRMED_PROBABILITY = 0.999
-"""What a user's word counts for, at least."""
+from mapmeld.merging.graph.edges import MOST_SURE
 
 
 class Pair:
@@ -42,7 +40,7 @@ class Pair:
         self.maps: Maps | None = None
         self.finding: Finding | None = None
         self.turn = 0
-        self._confirmed: Pose2 | None = None
+        self._confirmed: MatchResult | None = None
         if self.decree is Decree.CONFIRMED:
             self.decree = Decree.NONE
         self.withdrawn = withdrawn
@@ -51,6 +49,7 @@ class Pair:
     def look(self, maps: Maps, turn: int) -> None:
         """Match the newest maps."""
         previous, self.maps, self.turn = self.maps, maps, turn
+        decree, confirmed = self.decree, self._confirmed
         try:
             check_resolutions(*maps)
             self.finding = self._strategy.update(maps, previous)
@@ -60,13 +59,14 @@ class Pair:
         except MapmeldError as error:
             self.start_anew(str(error), withdrawn=self.withdrawn)
             self.maps, self.turn = maps, turn
+            self.decree, self._confirmed = decree, confirmed
 
     def confirm(self) -> str | None:
-        """Take the best match for right from now on; return why not, if there is none."""
-        T = None if self.finding is None or self.finding.best is None else self.finding.best.T_a_b
-        if T is None:
+        """Take the transform of the best match for right from now on; return why not, if there is none."""
+        best = None if self.finding is None else self.finding.best
+        if best is None or best.T_a_b is None:
             return "there is no match of the two yet that could be confirmed"
-        self.decree, self._confirmed = Decree.CONFIRMED, T
+        self.decree, self._confirmed = Decree.CONFIRMED, best
         return None
 
     def forbid(self) -> None:
@@ -88,11 +88,26 @@ class Pair:
     def result(self) -> MatchResult | None:
         """The match as the graph of all pairs is to take it; None where it has no say."""
         best = None if self.finding is None else self.finding.best
-        if best is None or self.decree is Decree.FORBIDDEN:
+        if self.decree is Decree.FORBIDDEN:
             return None
-        if self._confirmed is not None:
-            sure = max(best.probability or 0.0, CONFIRMED_PROBABILITY)
-            if best.verdict is not Verdict.ACCEPTED:
-                best = replace(best, T_a_b=self._confirmed, covariance=None, alternatives=())
-            return replace(best, verdict=Verdict.ACCEPTED, probability=sure, reason="confirmed by the user")
-        return best
+        if self._confirmed is None:
+            return best
+        # What was confirmed is this transform: a match follows the maps' drift, but never to another place.
+        if best is None or best.verdict is not Verdict.ACCEPTED or not self._as_confirmed(best):
+            best = self._confirmed
+            if best.verdict is not Verdict.ACCEPTED:  # such a one's covariance is of a mode among others
+                best = replace(best, covariance=None)
+        return replace(
+            best,
+            verdict=Verdict.ACCEPTED,
+            probability=max(best.probability or 0.0, MOST_SURE),
+            reason="confirmed by the user",
+            alternatives=(),
+        )
+
+    def _as_confirmed(self, result: MatchResult) -> bool:
+        assert self._confirmed is not None
+        one, other = self._confirmed.T_a_b, result.T_a_b
+        if one is None or other is None or self.maps is None:
+            return False
+        return same_place(one, other, self.maps)
