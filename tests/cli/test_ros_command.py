@@ -23,6 +23,13 @@ def test_a_file_of_parameters_that_is_not_there(tmp_path: Path) -> None:
 
 
 @needs_ros
+def test_a_robot_whose_name_is_impossible_is_refused_before_anything_starts(tmp_path: Path) -> None:
+    result = run_for_real("ros", "--robots", "good,bad-name", cwd=tmp_path)
+    assert result.code == 2
+    assert "'bad-name' is no namespace" in result.line
+
+
+@needs_ros
 @pytest.mark.parametrize("arguments", [["--params-file", "bad.yaml"], ["--ros-args", "--nonsense"]])
 def test_what_ros_cannot_read_is_said_without_a_traceback(arguments: list[str], tmp_path: Path) -> None:
     (tmp_path / "bad.yaml").write_text("bad: [")

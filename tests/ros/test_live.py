@@ -258,6 +258,15 @@ def test_services_and_parameters() -> None:
         assert listener.ask(Trigger, "reset").success
         assert listener.ask(AddDiagnostics, "forget_robot", load_namespace="robot_2").success
         until(lambda: listener.joined() == {"robot_1"}, "robot_2 to be forgotten")
+        parent, _ = listener.transforms[-1]["robot_2/map"]
+        assert parent == "mapmeld_apart"
+
+        # Robots that are named while the node runs: the others go, and come back when they are named again.
+        assert "is no namespace" in set_parameter(listener, "robots", ["bad-name"])
+        assert set_parameter(listener, "robots", ["robot_2"]) == ""
+        until(lambda: not listener.robot("robot_1") and not listener.joined(), "robot_1 to go")
+        assert set_parameter(listener, "robots", ["robot_1", "robot_2"]) == ""
+        until(lambda: "robot_1" in listener.joined(), "robot_1 to come back by its latched map")
 
 
 def world(listener: Listener, name: str, truth: Pose2) -> float:

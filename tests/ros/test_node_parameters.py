@@ -1,11 +1,12 @@
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mapmeld.live import FleetState, RobotReport
-from mapmeld.ros.listening import GRID, robots_on
+from mapmeld.ros.listening import GRID, Heard, robots_on
 from mapmeld.ros.parameters import (
     PARAMETERS,
     ParameterError,
@@ -17,7 +18,7 @@ from mapmeld.ros.parameters import (
     two_robots,
 )
 from mapmeld.ros.throttle import AGAIN, Throttle
-from mapmeld.ros.transforms import APART, frames_of, transforms_of
+from mapmeld.ros.transforms import APART, NOWHERE, frames_of, start_poses_of, transforms_of
 from mapmeld.se2 import Pose2
 
 DEFAULTS = {name: about.default for name, about in PARAMETERS.items()}
@@ -34,6 +35,12 @@ def test_robots_by_name() -> None:
     assert robot_names({"robots": ["/a/", " b", "a"]}) == ["a", "b"]
     with pytest.raises(ParameterError, match="not both"):
         robot_names({"robots": ["auto", "a"]})
+
+
+@pytest.mark.parametrize("name", ["bad-name", "1st", "a//b", "a b", "a__b", "é", "~", "a/2"])
+def test_names_that_ros_has_not_for_topics(name: str) -> None:
+    with pytest.raises(ParameterError, match="is no namespace"):
+        robot_names({"robots": ["good", name]})
 
 
 @given(st.builds(Pose2), st.floats(0, 10), st.floats(0, 3))
@@ -85,7 +92,7 @@ def test_warnings_are_said_once_in_a_while() -> None:
 
 
 def robot(name: str, frame: str, T: Pose2 | None) -> RobotReport:
-    return RobotReport(name, frame, None, T, None, False, 1, 0.0, "")
+    return RobotReport(name, frame, None, T, None if T is None else np.eye(3), False, 1, 0.0, "")
 
 
 def test_frames_are_never_shared_and_who_leaves_is_hung_apart() -> None:
@@ -98,6 +105,40 @@ def test_frames_are_never_shared_and_who_leaves_is_hung_apart() -> None:
     assert [t[:2] for t in transforms_of(state, "world", joined)] == [
         ("world", "a/map"), ("world", "c/map"), ("world", "d/map"),
     ]  # fmt: skip
-    left = FleetState((robot("c", "c/map", None),))
-    assert transforms_of(left, "world", joined) == [(APART, "c/map", Pose2())]
+    left = FleetState((robot("c", "c/map", None), robot("d", "d2", T)))
+    assert transforms_of(left, "world", joined) == [  # a is forgotten, d has started anew in another frame
+        ("world", "d2", T), (APART, "a/map", Pose2()), (APART, "c/map", Pose2()), (APART, "d/map", Pose2()),
+    ]  # fmt: skip
+    again = FleetState((robot("c", "c/map", T),))
+    assert [t[:2] for t in transforms_of(again, "d2", joined)] == [  # the world itself hangs nowhere
+        ("d2", "c/map"), (APART, "a/map"), (APART, "d/map"),
+    ]  # fmt: skip
     assert frames_of(FleetState((robot("a", "world", T),)), "world") == {"a": "a/world"}
+
+
+def test_start_poses_of_robots_that_leave_hold_no_more() -> None:
+    T = Pose2(1, 2, 3)
+    once: set[str] = set()
+    assert start_poses_of(FleetState((robot("a", "m", None),)), "world", once) == {}
+    (told,) = start_poses_of(FleetState((robot("a", "m", T),)), "world", once).values()
+    assert told[:2] == ("world", T)
+    for state in (FleetState((robot("a", "m", None),)), FleetState()):
+        frame, _, covariance = start_poses_of(state, "world", once)["a"]
+        assert frame == APART
+        assert covariance is NOWHERE
+    assert start_poses_of(FleetState((robot("a", "m", T),)), "world", once)["a"][:2] == ("world", T)
+
+
+def test_publishers_that_were_counted_before_the_first_map_make_none_stale() -> None:
+    def heard(counted: float | None, last: float | None, publishers: int = 0) -> Heard:
+        topics = ("/a/map", "/a/map_updates")
+        return Heard("a", *topics, publishers=publishers, counted=counted, last=last)
+
+    assert not heard(None, None).deserted, "not counted yet"
+    assert heard(5.0, None).deserted
+    assert heard(5.0, None).stale(6.0, 60.0) is None, "there is no map that could be stale"
+    assert not heard(5.0, 5.5).deserted, "counted before the middleware told of any"
+    assert heard(5.0, 5.5).stale(6.0, 60.0) is None
+    assert "nobody publishes" in str(heard(6.0, 5.5).stale(6.0, 60.0))
+    assert heard(6.0, 5.5, 1).stale(6.0, 60.0) is None
+    assert "no map for 65 s" in str(heard(6.0, 5.5, 1).stale(70.5, 60.0))

@@ -95,14 +95,62 @@ def test_drawing_can_be_put_off() -> None:
 
 def test_updates() -> None:
     at_work = worker()
-    patch = Patch(2, 3, np.full((2, 2), 100, np.int8), 1.0)
+    patch = Patch(2, 3, np.full((2, 2), 100, np.int8), 6.0)
     reply = round_of(at_work, a=Incoming(patches=[(patch, 0)]))
     assert "has not come yet" in reply.notices[0].text
     both = incoming(A, "a/map")
     both.patches.append((patch, 0))
     assert not round_of(at_work, a=both).notices
-    outside = Patch(10_000, 3, np.zeros((2, 2), np.int8), 1.0)
+    outside = Patch(10_000, 3, np.zeros((2, 2), np.int8), 6.0)
     assert "within" in round_of(at_work, a=Incoming(patches=[(outside, 0)])).notices[0].text
+
+
+def test_updates_of_an_earlier_map_are_passed_over() -> None:
+    at_work = worker()
+    cells = np.full((2, 2), 100, np.int8)
+    round_of(at_work, a=Incoming(map_bytes(A, "a", 10_000_000_000), 0))
+    for late in (Patch(2, 3, cells, 9.9), Patch(2, 3, cells, 5.0)):
+        assert not round_of(at_work, a=Incoming(patches=[(late, 0)])).notices
+        assert np.array_equal(at_work._maps["a"].cells, A.cells)
+        assert at_work._maps["a"].stamp == 10.0
+    # A stamp that is only when it was received says nothing: robots have clocks of their own.
+    round_of(at_work, a=Incoming(patches=[(Patch(2, 3, cells, 5.0, stamped=False), 0)]))
+    assert (at_work._maps["a"].cells[2:4, 3:5] == 100).all()
+    assert at_work._maps["a"].stamp == 10.0, "time does not go back"
+    round_of(at_work, a=Incoming(map_bytes(A, "a", 0), 7_000_000_000))
+    round_of(at_work, a=Incoming(patches=[(Patch(2, 3, cells, 5.0), 0)]))
+    assert (at_work._maps["a"].cells[2:4, 3:5] == 100).all()
+
+
+def test_a_forgotten_robot_gives_room_and_no_update_brings_it_back() -> None:
+    at_work = worker(Limits(max_robots=1))
+    round_of(at_work, a=incoming(A, "a"))
+    assert round_of(at_work, b=incoming(B, "b")).notices[0].about == "robots"
+    reply = round_of(at_work, Wish(1, "forget", ("a",)), b=incoming(B, "b"))
+    assert reply.answers[1][0]
+    assert [robot.name for robot in reply.state.robots] == ["b"]
+    reply = round_of(at_work, Wish(2, "forget", ("b",)))
+    reply = round_of(at_work, b=Incoming(patches=[(Patch(2, 3, np.zeros((2, 2), np.int8), 99.0), 0)]))
+    assert not reply.state.robots
+    assert "has not come yet" in reply.notices[0].text
+
+
+def test_what_cannot_be_drawn_takes_the_old_merged_map_away() -> None:
+    at_work = worker()
+    round_of(at_work, a=incoming(A, "a"), b=incoming(B, "b"))
+    far = KnownPose(Pose2(1e6, 1e6, 0))
+    wishes = (
+        Wish(1, "know", ("a", KnownPose(Pose2()))),
+        Wish(2, "know", ("b", far)),
+        Wish(3, "forbid", ("a", "b")),
+    )
+    reply = round_of(at_work, *wishes)
+    assert "is not drawn" in reply.notices[0].text
+    assert reply.merged is not None
+    blank = grid_from_bytes(reply.merged, 0, 10**9)
+    assert blank is not None
+    assert not blank.known.any()
+    assert round_of(at_work).merged is None
 
 
 def test_limits() -> None:

@@ -30,8 +30,34 @@ class Heard:
     quality: tuple[bool, bool] | None = None  # of the subscription: reliable, latched
     updates: Any = None
     publishers: int = 0
+    counted: float | None = None  # when these were counted [s, steady]
     last: float | None = None  # when its last map came [s, steady]
     second: tuple[float, int] = field(default=(0.0, 0))  # when this second began, and maps since
+
+    @property
+    def deserted(self) -> bool:
+        """Whether nobody publishes its map; what was counted before its last map came says nothing."""
+        if self.counted is None or self.publishers:
+            return False
+        return self.last is None or self.counted > self.last
+
+    def stale(self, now: float, after: float) -> str | None:
+        """Return why its map is stale; None if it is not, or there is none.
+
+        Parameters
+        ----------
+        now
+            [s, steady]
+        after
+            So long a robot may be silent [s].
+        """
+        if self.last is None:
+            return None
+        if self.deserted:
+            return "nobody publishes its map any more; the last one is kept"
+        if now - self.last > after:
+            return f"no map for {now - self.last:.0f} s; the last one is kept"
+        return None
 
 
 def robots_on(topics: Mapping[str, list[str]], map_topic: str, fragment: str, own: str) -> list[str]:
@@ -116,6 +142,10 @@ class UpdatesByCyclone:
         quality = dds.quality(latched=False, reliable=reliable)
         on = topics.Topic(self._participant, f"rt{topic}", OccupancyGridUpdate, qos=quality)
         self._readers[name] = subscribing.DataReader(self._participant, on, qos=quality)
+
+    def leave(self, name: str) -> None:
+        """Listen to a robot no more."""
+        self._readers.pop(name, None)
 
     def close(self) -> None:
         """End the thread."""

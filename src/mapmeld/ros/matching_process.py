@@ -5,11 +5,14 @@ from __future__ import annotations
 import multiprocessing
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
+from typing import TypeVar
 
 from mapmeld.io.recordings.messages import Patch
 from mapmeld.live import Decree, FleetSettings, FleetState
@@ -23,6 +26,7 @@ LONGEST_PAUSE = 30.0
 """[s] Before a process that dies again and again is started once more."""
 
 Answer = Future[tuple[bool, str]]
+T = TypeVar("T")
 
 
 class MatchingProcess:
@@ -39,9 +43,9 @@ class MatchingProcess:
     now
         The time of the node [ns].
     on_reply
-        Called in the thread with every answer.
+        Called in the thread with every answer. What it raises is told of, and nothing else comes of it.
     on_notice
-        Called in the thread with what is to be logged.
+        Called in any thread with what is to be logged.
     """
 
     def __init__(
@@ -58,6 +62,7 @@ class MatchingProcess:
         self._settings, self._limits = settings, limits
         self._changed = threading.Condition()
         self._pending: dict[str, Incoming] = {}
+        self._overrun: set[str] = set()  # robots whose updates are dropped until their next whole map
         self._wishes: list[Wish] = []
         self._answers: dict[int, Answer] = {}
         self._told: tuple[FleetSettings | None, Limits | None] = (None, None)
@@ -80,15 +85,21 @@ class MatchingProcess:
         """Take the newest map of a robot, serialised; what had waited of that robot is forgotten."""
         with self._changed:
             self._pending[name] = Incoming(data, received)
+            self._overrun.discard(name)
             self._changed.notify()
 
     def put_patch(self, name: str, patch: bytes | Patch, received: int) -> None:
         """Take an update of a robot's map."""
         with self._changed:
+            if name in self._overrun:
+                return
             incoming = self._pending.setdefault(name, Incoming())
             if len(incoming.patches) < MAX_PATCHES:
                 incoming.patches.append((patch, received))
-            self._changed.notify()
+                self._changed.notify()
+                return
+            self._overrun.add(name)
+        self._on_notice(_overrun(name))
 
     def wish(self, kind: str, *arguments: object) -> Answer:
         """Ask for something (`mapmeld.ros.worker.Wishes`); answers whether it was done, and a sentence."""
@@ -106,7 +117,8 @@ class MatchingProcess:
                     self._lasting["pair", first, second] = wish
                     self._unconfirmed.pop((first, second), None)
                 case "forget", (name,):
-                    self._kept.pop(str(name), None)
+                    for maps in (self._kept, self._pending):
+                        maps.pop(str(name), None)
             self._changed.notify()
         return answer
 
@@ -193,24 +205,40 @@ class MatchingProcess:
         mine.send(Start(self._settings, self._limits, self._state.poses))
 
     def _after(self, given: Round, reply: Reply) -> None:
+        for wish in given.wishes:
+            if wish.kind == "forget":  # once more: its map may have been on its way when that was asked for
+                self._kept.pop(str(wish.arguments[0]), None)
         for name, incoming in given.maps.items():
             if incoming.data is not None:
                 self._kept[name] = incoming
             elif name in self._kept:
-                kept = self._kept[name]
-                self._kept[name] = replace(kept, patches=[*kept.patches, *incoming.patches][-MAX_PATCHES:])
+                self._kept[name] = _together(self._kept[name], incoming)
             self._suspects.pop(name, None)
         self._state = reply.state
         if not reply.waiting:
             self._deaths = 0
         self._confirm_again(reply)
-        for notice in reply.notices:
-            self._on_notice(notice)
-        self._on_reply(reply)
         for number, (done, sentence) in reply.answers.items():
             with self._changed:
                 answer = self._answers.pop(number)
             answer.set_result((done, sentence))
+        for notice in reply.notices:
+            self._tell(self._on_notice, notice)
+        self._tell(self._on_reply, reply)
+
+    def _tell(self, listener: Callable[[T], object], what: T) -> None:
+        try:
+            listener(what)
+        except Exception as error:  # whatever it is, the robots that map now need the next round
+            if self._is_closing():
+                return
+            at = traceback.extract_tb(error.__traceback__)[-1]
+            where = f"{at.name}, line {at.lineno}"
+            what_happened = f"{type(error).__name__}: {error} (in {where})"
+            with suppress(Exception):
+                self._on_notice(
+                    Notice("telling", f"telling what was found failed, merging goes on: {what_happened}")
+                )
 
     def _after_death(self, given: Round, error: Exception) -> None:
         self._end()
@@ -221,12 +249,15 @@ class MatchingProcess:
             if name in self._suspects and self._suspects[name] == incoming.data
         ]
         lost = f"; those of {', '.join(sorted(given_up))} are given up" if given_up else ""
-        self._on_notice(
+        thinned = [name for name, kept in self._kept.items() if len(kept.patches) >= MAX_PATCHES]
+        lost += f"; old updates of {', '.join(sorted(thinned))} are lost" if thinned else ""
+        self._tell(
+            self._on_notice,
             Notice(
                 "process",
                 f"the matching process died ({type(error).__name__}) on new maps of: {names}; "
                 f"it is started again{lost}",
-            )
+            ),
         )
         for wish in given.wishes:
             with self._changed:
@@ -282,6 +313,11 @@ class MatchingProcess:
         if process is not None:
             process.terminate()
             process.join(timeout=5)
+
+
+def _overrun(name: str) -> Notice:
+    text = f"{name}: {MAX_PATCHES} updates wait already; more are left out until its next whole map"
+    return Notice(f"{name} updates", text)
 
 
 def _together(older: Incoming, newer: Incoming | None) -> Incoming:

@@ -37,7 +37,7 @@ from mapmeld.ros.parameters import (
 )
 from mapmeld.ros.status import diagnostic_array, items_of
 from mapmeld.ros.throttle import Throttle
-from mapmeld.ros.transforms import frames_of, static_transforms, transforms_of
+from mapmeld.ros.transforms import frames_of, start_poses_of, static_transforms, transforms_of
 from mapmeld.ros.work import Notice, Reply
 from mapmeld.ros.worker import memory_of_process
 
@@ -64,12 +64,15 @@ class MergingNode:
         self._reply: Reply | None = None
         self._heard: dict[str, Heard] = {}
         self._start_poses: dict[str, Any] = {}
-        self._once_joined: set[str] = set()
+        self._told_starts: dict[str, tuple[object, ...]] = {}
+        self._once_joined: set[str] = set()  # frames
+        self._once_placed: set[str] = set()  # robots
         self._told: Any = None
         self._logged: tuple[FleetState, dict[str, str]] = (self._state, {})
         self._publishing = threading.Lock()
         self._given_poses: dict[str, Any] = {}
         self._values = self._declared(list(robots))
+        self._check(self._values)
         settings = fleet_settings(self._values)
 
         latched = listening.profile(reliable=True, latched=True)
@@ -169,7 +172,6 @@ class MergingNode:
 
     def _apply(self, changed: dict[str, Any]) -> None:
         values = self._values
-        self._check(values)
         self.matching.period = 1 / values["estimation_rate"]
         self.matching.draw_period = 1 / values["merging_rate"]
         if changed is not values and changed.keys() & {
@@ -199,32 +201,63 @@ class MergingNode:
     def _look(self) -> None:
         """Find robots, and listen to each as its publishers allow."""
         topics = dict(self.node.get_topic_names_and_types())
-        names = robot_names(self._values)
-        if names is None:
-            fragment = self._values["robot_namespace"]
-            names = listening.robots_on(
-                topics, self._values["robot_map_topic"], fragment, self._merged.topic_name
-            )
-        for name in names:
-            if name in self._heard:
-                continue
-            if len(self._heard) >= self._values["max_robots"]:
-                self._say("robots", f"{name} is left out: there are max_robots, {len(self._heard)}, already")
-                continue
-            base = f"/{name}/"
-            self._heard[name] = Heard(
-                name,
-                base + self._values["robot_map_topic"].strip("/"),
-                base + self._values["robot_map_updates_topic"].strip("/"),
-            )
-            self.node.get_logger().info(f"listening to {self._heard[name].map_topic}")
+        named = robot_names(self._values)
+        if named is not None:
+            for name in self._heard.keys() - set(named):
+                self._leave(name)
+            for robot in self._state.robots:
+                if robot.name not in named:
+                    self.matching.wish("forget", robot.name)
+        fragment, map_topic = self._values["robot_namespace"], self._values["robot_map_topic"]
+        names = listening.robots_on(topics, map_topic, fragment, self._merged.topic_name)
+        for name in names if named is None else named:
+            if name not in self._heard and self._has_room(name, anybody=named is None):
+                base = f"/{name}/"
+                self._heard[name] = Heard(
+                    name,
+                    base + map_topic.strip("/"),
+                    base + self._values["robot_map_updates_topic"].strip("/"),
+                )
+                self.node.get_logger().info(f"listening to {self._heard[name].map_topic}")
         for heard in self._heard.values():
-            self._listen(heard, topics)
+            try:
+                self._listen(heard, topics)
+            except Exception as error:  # what is wrong with one robot is no other's harm
+                if not self.node.context.ok():
+                    raise
+                self._say(f"{heard.name} listening", f"{heard.name} cannot be listened to: {error}")
+
+    def _has_room(self, name: str, *, anybody: bool) -> bool:
+        """Whether one more robot may be listened to; anybody takes the place of one that has gone."""
+        if len(self._heard) < self._values["max_robots"]:
+            return True
+        map_topic = f"/{name}/{self._values['robot_map_topic'].strip('/')}"
+        gone = [h for h in self._heard.values() if h.deserted and h.name not in self._state.poses]
+        if anybody and not self.node.count_publishers(map_topic):
+            return False  # others listen to it as well, that is why there is the topic
+        if anybody and gone:
+            self._leave(min(gone, key=lambda heard: heard.last or 0.0).name)
+            return True
+        self._say("robots", f"{name} is left out: there are max_robots, {len(self._heard)}, already")
+        return False
+
+    def _leave(self, name: str) -> None:
+        """Listen to a robot no more, and forget it."""
+        heard = self._heard.pop(name)
+        if heard.subscription is not None:
+            self.node.destroy_subscription(heard.subscription)
+        if self._updates is not None and heard.updates is self._updates:
+            self._updates.leave(name)
+        elif heard.updates is not None:
+            self.node.destroy_subscription(heard.updates)
+        self.matching.wish("forget", name)
+        self.node.get_logger().info(f"listening no more to {heard.map_topic}")
 
     def _listen(self, heard: Heard, topics: dict[str, list[str]]) -> None:
+        now = time.monotonic()
         publishers = self.node.get_publishers_info_by_topic(heard.map_topic)
         publishers = [p for p in publishers if p.topic_type == listening.GRID]
-        heard.publishers = len(publishers)
+        heard.publishers, heard.counted = len(publishers), now
         quality = listening.quality_of(publishers)
         if heard.subscription is None or (publishers and quality != heard.quality):
             if heard.subscription is not None:
@@ -263,6 +296,8 @@ class MergingNode:
             )
 
     def _on_map(self, heard: Heard, data: bytes) -> None:
+        if self._heard.get(heard.name) is not heard:
+            return  # on its way when it was listened to for the last time
         now = time.monotonic()
         heard.last = now
         began, count = heard.second
@@ -279,6 +314,8 @@ class MergingNode:
         self.matching.put_map(heard.name, bytes(data), time.time_ns())
 
     def _on_update(self, heard: Heard, data: bytes) -> None:
+        if self._heard.get(heard.name) is not heard:
+            return
         heard.last = time.monotonic()
         self.matching.put_patch(heard.name, data, time.time_ns())
 
@@ -286,20 +323,16 @@ class MergingNode:
         if isinstance(patch, BadMessageError):
             self._on_notice(Notice(f"{name} map", f"{name}: ignored {patch}"))
             return
-        self._heard[name].last = time.monotonic()
+        heard = self._heard.get(name)
+        if heard is None:
+            return
+        heard.last = time.monotonic()
         self.matching.put_patch(name, patch, time.time_ns())
 
     def _stale(self) -> dict[str, str]:
-        stale = {}
         now, after = time.monotonic(), self._values["stale_after"]
-        for name, heard in list(self._heard.items()):
-            if heard.last is None:
-                continue
-            if heard.publishers == 0:
-                stale[name] = "nobody publishes its map any more; the last one is kept"
-            elif now - heard.last > after:
-                stale[name] = f"no map for {now - heard.last:.0f} s; the last one is kept"
-        return stale
+        found = {name: heard.stale(now, after) for name, heard in list(self._heard.items())}
+        return {name: why for name, why in found.items() if why is not None}
 
     # ------------------------------------------------------------------ what comes of it
     def _on_notice(self, notice: Notice) -> None:
@@ -311,23 +344,29 @@ class MergingNode:
         self._state, self._reply = reply.state, reply
         if reply.merged is not None:
             self._merged.publish(reply.merged)
+        self._tell_start_poses(reply.state, world, now)
         transforms = transforms_of(reply.state, world, self._once_joined)
         told = (world, transforms, self._values["publish_tf"])
         if told == self._told:
             return
-        self._told = told
         if self._transforms is not None and self._values["publish_tf"] and transforms:
             self._transforms.send(transforms, now)
         self._poses.publish(pose_array(list(reply.state.poses.values()), world, now))
-        for robot in reply.state.robots:
-            if robot.T_world_robot is not None and robot.covariance is not None:
-                publisher = self._start_poses.get(robot.name)
-                if publisher is None:
-                    topic = f"/{robot.name}/start_pose"
-                    publisher = self.node.create_publisher(self._pose_type, topic, self._latched)
-                    self._start_poses[robot.name] = publisher
-                publisher.publish(pose_with_covariance(robot.T_world_robot, robot.covariance, world, now))
+        self._told = told
         self._tell()
+
+    def _tell_start_poses(self, state: FleetState, world: str, now: int) -> None:
+        for name, (frame, T, covariance) in start_poses_of(state, world, self._once_placed).items():
+            told = (frame, T, covariance.tobytes())
+            if told == self._told_starts.get(name):
+                continue
+            publisher = self._start_poses.get(name)
+            if publisher is None:
+                topic = f"/{name}/start_pose"
+                publisher = self.node.create_publisher(self._pose_type, topic, self._latched)
+                self._start_poses[name] = publisher
+            publisher.publish(pose_with_covariance(T, covariance, frame, now))
+            self._told_starts[name] = told
 
     def _tell(self) -> None:
         """Publish the status."""
@@ -352,7 +391,7 @@ class MergingNode:
             "callback_ms_max": f"{1e3 * self._latencies.longest:.2f}",
             "callback_cpu_ms_max": f"{1e3 * self._latencies.busiest:.2f}",
             "callback_ms_max_of": " ".join(
-                f"{name.strip('_<>')}={1e3 * s:.1f}" for name, s in self._latencies.longest_of.items()
+                f"{name.strip('_<>')}={1e3 * s:.1f}" for name, s in list(self._latencies.longest_of.items())
             ),
             "late_ms_99": f"{1e3 * self._lateness.percentile(99):.2f}",
             "late_ms_max": f"{1e3 * self._lateness.longest:.2f}",

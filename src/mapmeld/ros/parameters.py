@@ -6,6 +6,7 @@ Names that users of multirobot_map_merge know are theirs, where the meaning is t
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -18,6 +19,7 @@ from mapmeld.ros.work import Limits
 from mapmeld.se2 import Pose2
 
 AUTO = "auto"
+_NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)  # what ROS has for names of topics
 
 
 class ParameterError(MapmeldError):
@@ -114,13 +116,25 @@ def limits(values: Mapping[str, Any]) -> Limits:
 
 
 def robot_names(values: Mapping[str, Any]) -> list[str] | None:
-    """Return the robots that are named, without slashes around; None for those that appear."""
+    """Return the robots that are named, without slashes around; None for those that appear.
+
+    Raises
+    ------
+    ParameterError
+        One is no namespace, or it says both auto and names.
+    """
     names = [name.strip().strip("/") for name in values["robots"]]
     names = [name for name in names if name]
     if not names or names == [AUTO]:
         return None
     if AUTO in names:
         raise ParameterError("robots: [auto], or names, not both")
+    for name in names:
+        if not _NAMESPACE.fullmatch(name) or "__" in name:
+            raise ParameterError(
+                f"robots: {name[:80]!r} is no namespace, which has letters, digits and single _ only, "
+                "and parts with / in between that do not begin with a digit"
+            )
     return list(dict.fromkeys(names))
 
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mapmeld.extras import MissingExtraError, required
 from mapmeld.live import FleetState
 from mapmeld.ros import dds
@@ -20,6 +23,10 @@ APART = "mapmeld_apart"
 
 A static transform cannot be taken back; but a frame that gets another parent leaves the first one.
 """
+
+
+NOWHERE = np.diag([1e12, 1e12, 1e12])
+"""Covariance of a start pose that holds no more."""
 
 
 class TransformPublisher(Protocol):
@@ -109,14 +116,44 @@ def frames_of(state: FleetState, world: str) -> dict[str, str]:
 
 
 def transforms_of(state: FleetState, world: str, once_joined: set[str]) -> list[tuple[str, str, Pose2]]:
-    """Return a fleet's static transforms: world to map frame, or `APART` where robots have left it."""
+    """Return a fleet's static transforms: world to map frame, and below `APART` what has left the world.
+
+    Parameters
+    ----------
+    state
+        Of the fleet.
+    world
+        Name of the world frame.
+    once_joined
+        Frames that were ever below a world; gets those that are now.
+    """
     frames = frames_of(state, world)
-    told = []
-    for robot in state.robots:
-        child = frames[robot.name]
-        if robot.T_world_robot is not None:
-            told.append((world, child, robot.T_world_robot))
-            once_joined.add(child)
-        elif child in once_joined:
-            told.append((APART, child, Pose2()))
-    return told
+    told = [(world, frames[name], T) for name, T in state.poses.items()]
+    joined = {child for _, child, _ in told}
+    once_joined.update(joined)
+    # Also of robots that are forgotten, or call their frame otherwise now. The world itself hangs nowhere.
+    return told + [(APART, child, Pose2()) for child in sorted(once_joined - joined - {world})]
+
+
+def start_poses_of(
+    state: FleetState, world: str, once_joined: set[str]
+) -> dict[str, tuple[str, Pose2, NDArray[np.float64]]]:
+    """Return by robot the frame, the pose and the covariance (3, 3) of its start pose.
+
+    A latched pose cannot be taken back either: that of a robot which is joined no more is in the frame
+    `APART`, with the covariance `NOWHERE`.
+
+    Parameters
+    ----------
+    state, world
+        As for `transforms_of`.
+    once_joined
+        Robots that were ever joined; gets those that are now.
+    """
+    told = {
+        robot.name: (world, robot.T_world_robot, robot.covariance)
+        for robot in state.robots
+        if robot.T_world_robot is not None and robot.covariance is not None
+    }
+    once_joined.update(told)
+    return told | {name: (APART, Pose2(), NOWHERE) for name in sorted(once_joined - told.keys())}

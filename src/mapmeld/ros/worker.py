@@ -12,7 +12,13 @@ from pathlib import Path
 from mapmeld.errors import MapmeldError
 from mapmeld.grid import OccupancyGrid
 from mapmeld.io import MapFileError, save
-from mapmeld.io.recordings.messages import BadMessageError, Patch, patched
+from mapmeld.io.recordings.messages import (
+    BadMessageError,
+    Patch,
+    is_of_an_earlier_map,
+    own_stamp,
+    patched,
+)
 from mapmeld.live import Fleet
 from mapmeld.merging.graph import KnownPose
 from mapmeld.ros.messages import grid_from_bytes, map_bytes, patch_from_bytes
@@ -46,6 +52,7 @@ class Worker:
         self.fleet = Fleet(start.settings, start.poses)
         self._limits = start.limits
         self._maps: dict[str, OccupancyGrid] = {}  # updates are laid on these
+        self._since: dict[str, float | None] = {}  # the stamps of the last whole maps, if they have their own
         self._drawn: tuple[object, ...] | None = None
         self._busy = 0.0
 
@@ -57,9 +64,13 @@ class Worker:
             self._limits = given.limits
         if given.settings is not None:
             self.fleet.change(given.settings)
+        # Robots go before others come: there may be no more room. What is here of them came after that wish.
+        wishes = sorted(given.wishes, key=lambda wish: wish.kind != "forget")
+        going = sum(wish.kind == "forget" for wish in wishes)
+        answers = {wish.number: self._fulfil(wish) for wish in wishes[:going]}
         for name, incoming in given.maps.items():
             notices += self._take(name, incoming)
-        answers = {wish.number: self._fulfil(wish) for wish in given.wishes}
+        answers |= {wish.number: self._fulfil(wish) for wish in wishes[going:]}
         try:
             self.fleet.work()
         except MemoryError:
@@ -88,7 +99,7 @@ class Worker:
         notices = []
         if name not in self._maps and len(self._maps) >= self._limits.max_robots:
             return [Notice("robots", f"{name} is left out: more than max_robots, {self._limits.max_robots}")]
-        grid = self._maps.get(name)
+        grid, since = self._maps.get(name), self._since.get(name)
         try:
             if incoming.data is not None:
                 whole = grid_from_bytes(incoming.data, incoming.received, self._limits.max_cells)
@@ -102,13 +113,15 @@ class Worker:
                             f"not {grid.resolution:g} m",
                         )
                     )
-                grid = whole
-            for patch, received in incoming.patches:
-                grid = _with(grid, patch if isinstance(patch, Patch) else patch_from_bytes(patch, received))
+                grid, since = whole, own_stamp(whole, incoming.received)
+            for item, received in incoming.patches:
+                patch = item if isinstance(item, Patch) else patch_from_bytes(item, received)
+                if not is_of_an_earlier_map(patch, since):
+                    grid = _with(grid, patch)
         except (BadMessageError, ValueError) as error:
             notices.append(Notice(f"{name} map", f"{name}: ignored {error}"))
         if grid is not None and grid is not self._maps.get(name):
-            self._maps[name] = grid
+            self._maps[name], self._since[name] = grid, since
             anew = self.fleet.put(name, grid)
             if anew:
                 notices.append(Notice(f"{name} anew", anew))
@@ -117,7 +130,11 @@ class Worker:
     # ------------------------------------------------------------------ wishes
     def _fulfil(self, wish: Wish) -> tuple[bool, str]:
         try:
-            return True, str(getattr(Wishes(self.fleet), wish.kind)(*wish.arguments))
+            sentence = str(getattr(Wishes(self.fleet), wish.kind)(*wish.arguments))
+            if wish.kind == "forget":
+                for kept in (self._maps, self._since):  # an update shall not bring its old map back
+                    kept.pop(str(wish.arguments[0]), None)
+            return True, sentence
         except MapmeldError as error:
             return False, str(error)
 
@@ -132,7 +149,7 @@ class Worker:
             merged = self.fleet.merged()
         except MapmeldError as error:
             notices.append(Notice("merged", f"the merged map is not drawn: {error}"))
-            return None, False
+            merged = self.fleet.blank()  # the one before is right no more
         if merged is None:
             return None, False
         return map_bytes(merged, self.fleet.settings.world_frame, given.now), False

@@ -291,6 +291,18 @@ def test_an_update_after_an_empty_map_has_nothing_to_change(tmp_path: Path) -> N
     assert states.left_out == {"an update that came before any map": 1}
 
 
+def test_updates_of_an_earlier_map_are_passed_over(tmp_path: Path) -> None:
+    """By the headers' stamps; what has none is taken, in the order in which it came."""
+    late = sent_update(2, 0, 0, [[7]])
+    late.fields["stamp"] = 0.5
+    unset = sent_update(3, 0, 0, [[8]])
+    unset.fields["stamp"] = -math.inf
+    states = states_of(tmp_path, sent_map(1, SMALL), late, unset)
+    found = [int(state.cells[0, 0]) for state in states]
+    assert found[1:] == [8]
+    assert states.left_out == {"an update that is older than the map": 1}
+
+
 def test_updates_leave_earlier_states_as_they_were(tmp_path: Path) -> None:
     first, second = states_of(tmp_path, sent_map(0, SMALL), sent_update(1, 1, 1, [[7, -128]]))
     np.testing.assert_array_equal(first.cells, SMALL)

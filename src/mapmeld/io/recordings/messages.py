@@ -53,12 +53,15 @@ class Patch:
         (rows, cols)
     stamp
         [s]
+    stamped
+        Whether the stamp is the message's own; else it is when that was received.
     """
 
     row: int
     col: int
     cells: Cells
     stamp: float
+    stamped: bool = True
 
 
 def grid_of(data: bytes, encoding: str, received: int) -> OccupancyGrid | None:
@@ -120,11 +123,25 @@ def patch_of(data: bytes, encoding: str, received: int) -> Patch:
 def patch_from_message(message: Any, received: int) -> Patch:
     """Return the patch in an OccupancyGridUpdate message that is decoded already; as `patch_of`."""
     cells = _cells_of(message.data, int(message.height), int(message.width))
-    return Patch(int(message.y), int(message.x), cells, stamp_of(message.header, received))
+    stamped = bool(message.header.stamp.sec or message.header.stamp.nanosec)
+    return Patch(int(message.y), int(message.x), cells, stamp_of(message.header, received), stamped)
+
+
+def own_stamp(grid: OccupancyGrid, received: int) -> float | None:
+    """Return the stamp [s] of a map that was received then [ns]; None if its header had none."""
+    return None if grid.stamp == seconds(received) else grid.stamp
+
+
+def is_of_an_earlier_map(patch: Patch, since: float | None) -> bool:
+    """Whether a patch is older than the whole map before it, whose own stamp is `since` [s].
+
+    It is meant for the cells of a map before that one, which may have lain elsewhere.
+    """
+    return since is not None and patch.stamped and patch.stamp < since
 
 
 def patched(grid: OccupancyGrid, patch: Patch) -> OccupancyGrid | None:
-    """Return the map with a patch laid on; None if it does not lie wholly within the map."""
+    """Return the map with a patch laid on, never older; None if it does not lie wholly within the map."""
     rows, cols = patch.cells.shape
     height, width = grid.shape
     if not (0 <= patch.row <= height - rows and 0 <= patch.col <= width - cols):
@@ -132,7 +149,8 @@ def patched(grid: OccupancyGrid, patch: Patch) -> OccupancyGrid | None:
     cells = grid.cells.copy()
     cells[patch.row : patch.row + rows, patch.col : patch.col + cols] = patch.cells
     cells.flags.writeable = False
-    return replace(grid, cells=cells, stamp=patch.stamp)
+    stamp = patch.stamp if grid.stamp is None else max(grid.stamp, patch.stamp)
+    return replace(grid, cells=cells, stamp=stamp)
 
 
 def _cells_of(values: Any, rows: int, cols: int) -> Cells:

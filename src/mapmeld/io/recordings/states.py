@@ -17,6 +17,8 @@ from mapmeld.io.recordings.messages import (
     BadMessageError,
     RecordingError,
     grid_of,
+    is_of_an_earlier_map,
+    own_stamp,
     patch_of,
     patched,
     seconds,
@@ -87,13 +89,15 @@ class MapStates(Iterator[OccupancyGrid]):
     def _read(self, path: str, source: Source, channels: list[Channel], damaged: Damaged) -> Iterator[State]:
         start = source.start or 0
         current: OccupancyGrid | None = None
+        since: float | None = None  # the stamp of the last whole map, if it has one of its own
         for channel, received, data in source.messages(channels):
             try:
                 if channel.type == GRID:
                     current = grid_of(data, channel.encoding, received)
                     changed = current
+                    since = None if current is None else own_stamp(current, received)
                 else:
-                    changed = self._updated(current, data, channel, received)
+                    changed = self._updated(current, since, data, channel, received)
             except BadMessageError as error:
                 after = seconds(received - start)
                 if damaged == "refuse":
@@ -111,11 +115,14 @@ class MapStates(Iterator[OccupancyGrid]):
                 yield State(seconds(received - start), changed)
 
     def _updated(
-        self, current: OccupancyGrid | None, data: bytes, channel: Channel, received: int
+        self, current: OccupancyGrid | None, since: float | None, data: bytes, channel: Channel, received: int
     ) -> OccupancyGrid | None:
         patch = patch_of(data, channel.encoding, received)
         if current is None:
             self.left_out["an update that came before any map"] += 1
+            return None
+        if is_of_an_earlier_map(patch, since):
+            self.left_out["an update that is older than the map"] += 1
             return None
         changed = patched(current, patch)
         if changed is None:
@@ -127,8 +134,9 @@ def map_states(path: AnyPath, topic: str | None = None, *, damaged: Damaged = "r
     """Give the states of a map in a recording, in the order in which they were received.
 
     Reads as it goes: a recording may be larger than memory. Updates on ``TOPIC_updates`` are laid on the
-    last map, each giving a state. Two kinds are passed over, as RViz and nav2 do: those that come before the
-    first map (what they would change is not known), and those that reach outside of the map. So are
+    last map, each giving a state. Three kinds are passed over: those that come before the first map (what
+    they would change is not known) and those that reach outside of the map, as RViz and nav2 do, and those
+    whose stamp is before the map's (they were meant for one before, which may have lain elsewhere). So are
     maps without cells, which some mappers send before they have one.
 
     Parameters
