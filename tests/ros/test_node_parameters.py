@@ -58,7 +58,18 @@ def test_degrees_must_be_named() -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["", "a", "a 1 2", "a 1 2 3 4", "a 1 2 x", "a 1 2 nan", "a 1deg 2 3", "a 1 2 3 -1 0", "a 1 2 3 4 5 6"],
+    [
+        "",
+        "a",
+        "a 1 2",
+        "a 1 2 3 4",
+        "a 1 2 x",
+        "a 1 2 nan",
+        "a 1deg 2 3",
+        "a 1 2 3 -1 0",
+        "a 1 2 3 4 5 6",
+        "a 1 2 90",
+    ],
 )
 def test_what_is_no_pose(text: str) -> None:
     with pytest.raises(ParameterError, match="known pose"):
@@ -100,18 +111,22 @@ def test_frames_are_never_shared_and_who_leaves_is_hung_apart() -> None:
     state = FleetState(
         (robot("a", "map", T), robot("b", "map", None), robot("c", "c/map", T), robot("d", "", T))
     )
-    assert frames_of(state, "world") == {"a": "a/map", "b": "b/map", "c": "c/map", "d": "d/map"}
+    assert frames_of(state, "world") == {"a": "map", "b": "b/map", "c": "c/map", "d": "d/map"}
+    both = FleetState((robot("a", "map", T), robot("b", "map", T), robot("c", "map", None)))
+    assert frames_of(both, "world") == {"a": "a/map", "b": "b/map", "c": "c/map"}
+    neither = FleetState((robot("a", "map", None), robot("b", "map", None)))
+    assert frames_of(neither, "world") == {"a": "a/map", "b": "b/map"}
     joined: set[str] = set()
     assert [t[:2] for t in transforms_of(state, "world", joined)] == [
-        ("world", "a/map"), ("world", "c/map"), ("world", "d/map"),
+        ("world", "map"), ("world", "c/map"), ("world", "d/map"),
     ]  # fmt: skip
     left = FleetState((robot("c", "c/map", None), robot("d", "d2", T)))
     assert transforms_of(left, "world", joined) == [  # a is forgotten, d has started anew in another frame
-        ("world", "d2", T), (APART, "a/map", Pose2()), (APART, "c/map", Pose2()), (APART, "d/map", Pose2()),
+        ("world", "d2", T), (APART, "c/map", Pose2()), (APART, "d/map", Pose2()), (APART, "map", Pose2()),
     ]  # fmt: skip
     again = FleetState((robot("c", "c/map", T),))
     assert [t[:2] for t in transforms_of(again, "d2", joined)] == [  # the world itself hangs nowhere
-        ("d2", "c/map"), (APART, "a/map"), (APART, "d/map"),
+        ("d2", "c/map"), (APART, "d/map"), (APART, "map"),
     ]  # fmt: skip
     assert frames_of(FleetState((robot("a", "world", T),)), "world") == {"a": "a/world"}
 

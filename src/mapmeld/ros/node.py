@@ -258,6 +258,9 @@ class MergingNode:
         publishers = self.node.get_publishers_info_by_topic(heard.map_topic)
         publishers = [p for p in publishers if p.topic_type == listening.GRID]
         heard.publishers, heard.counted = len(publishers), now
+        if len(publishers) > 1:
+            said = f"{len(publishers)} publish {heard.map_topic}; a robot's map is to have one publisher"
+            self._say(f"{heard.name} publishers", said)
         quality = listening.quality_of(publishers)
         if heard.subscription is None or (publishers and quality != heard.quality):
             if heard.subscription is not None:

@@ -160,7 +160,8 @@ def pose_in_words(text: str) -> tuple[str, KnownPose]:
         return name.strip("/"), KnownPose(Pose2(*numbers[:3]), *sigmas)
     except ValueError:
         raise ParameterError(
-            f"a known pose is 'ROBOT X Y YAW' or 'ROBOT X Y YAW SIGMA_M SIGMA_RAD', not {text[:80]!r}"
+            f"a known pose is 'ROBOT X Y YAW' or 'ROBOT X Y YAW SIGMA_M SIGMA_RAD', angles in radians or as "
+            f"90deg, not {text[:80]!r}"
         ) from None
 
 

@@ -105,14 +105,18 @@ class _ByCyclone:
 
 
 def frames_of(state: FleetState, world: str) -> dict[str, str]:
-    """Return the map frame of each robot, its own: what two share gets the robot's name before it."""
-    names = [robot.frame_id.removeprefix("/") for robot in state.robots]
-    return {
-        robot.name: name
-        if name and name != world and names.count(name) == 1
-        else f"{robot.name}/{name or 'map'}"
-        for robot, name in zip(state.robots, names, strict=True)
-    }
+    """Return the map frame of each robot, its own: what two share gets the robot's name before it.
+
+    A robot that is not joined does not take the name of one that is.
+    """
+    frames = {}
+    for robot in state.robots:
+        name = robot.frame_id.removeprefix("/")
+        rivals = [r for r in state.robots if r.joined or not robot.joined]
+        shared = sum(r.frame_id.removeprefix("/") == name for r in rivals) > 1
+        own = name and name != world and not shared
+        frames[robot.name] = name if own else f"{robot.name}/{name or 'map'}"
+    return frames
 
 
 def transforms_of(state: FleetState, world: str, once_joined: set[str]) -> list[tuple[str, str, Pose2]]:
